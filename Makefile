@@ -1,0 +1,50 @@
+# Everything runs in .venv, which `make` sets up on a machine that has python3 >= 3.11 and make.
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+export MUJOCO_GL ?= egl
+
+.PHONY: demo test check unit readme test-slow test-mujoco4 clean
+
+demo: $(VENV)/ready
+	$(BIN)/rftsim demo
+
+test: check unit readme
+
+check: $(VENV)/ready
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+unit: $(VENV)/ready
+	$(BIN)/pytest
+
+readme: $(VENV)/ready
+	$(BIN)/python tests/readme.py
+
+test-slow: $(VENV)/ready
+	$(BIN)/pytest -m slow
+
+# The core's own tests on the next MuJoCo, in an environment of its own.
+test-mujoco4: .venv-mujoco4/ready
+	.venv-mujoco4/bin/pytest tests/verification tests/engine
+
+$(VENV)/ready: pyproject.toml constraints.txt
+	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "rftsim needs python3 >= 3.11; set PYTHON")'
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
+	touch $@
+
+.venv-mujoco4/ready: pyproject.toml constraints.txt
+	$(PYTHON) -m venv .venv-mujoco4
+	grep -v '^mujoco==' constraints.txt > .venv-mujoco4/constraints.txt
+	.venv-mujoco4/bin/pip install --quiet --disable-pip-version-check -c .venv-mujoco4/constraints.txt \
+		numpy numba trimesh scipy networkx pytest pytest-benchmark hypothesis rich tyro matplotlib
+	.venv-mujoco4/bin/pip install --quiet --disable-pip-version-check mujoco==4.0.0
+	.venv-mujoco4/bin/pip install --quiet --disable-pip-version-check --no-deps -e .
+	touch $@
+
+clean:
+	rm -rf .venv .venv-mujoco4 out

@@ -1,0 +1,1 @@
+"""Models: MJCF built for scenes on sand; they know nothing of it."""

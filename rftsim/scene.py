@@ -1,0 +1,310 @@
+"""Sand under a MuJoCo model: what is modelled, and the MJCF elements that carry it."""
+
+import dataclasses
+import difflib
+import math
+import warnings
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rftsim import packed
+from rftsim.engine import plugin
+from rftsim.errors import RftsimWarning, SceneError
+from rftsim.geometry import body_surface, geom_label, is_colliding
+from rftsim.laws import Law, get_law
+from rftsim.sand import FreeSurface, Sand, make_sand
+from rftsim.surface import Surface, Wheel
+
+_GEOM = mujoco.mjtGeom
+SAND_RGBA = (0.76, 0.70, 0.50, 0.55)
+
+
+class Bed(NamedTuple):
+    """Sand that was put under a model, and what feels it."""
+
+    name: str
+    sand: Sand
+    law: Law
+    free_surface: FreeSurface
+    surfaces: dict[str, Surface]
+    """Surface of each body that feels the sand, by body name."""
+    reasons: dict[str, str]
+    """Why each body of the model does or does not feel it, by body name."""
+    notes: tuple[str, ...]
+    """What was found doubtful or repaired."""
+
+
+def add_sand(
+    spec: mujoco.MjSpec,
+    sand: "Sand | str | Mapping[str, Any]" = "poppy-seeds",
+    law: "Law | str" = "rft3d",
+    *,
+    bodies: Iterable[str] | None = None,
+    surface: "FreeSurface | float" = 0.0,
+    plane: ArrayLike = (0.0, 1.0, 0.0),
+    geoms: Literal["collision", "all"] = "collision",
+    max_edge: float | None = None,
+    wheels: "Mapping[str, Wheel] | Iterable[str]" = (),
+    disable_floor: bool = False,
+    allow_open: bool = False,
+    sensors: bool = True,
+    draw: bool = True,
+    name: str = "sand",
+) -> Bed:
+    """Put sand under a model that is not compiled yet.
+
+    Bodies without a name get one. Each body that feels the sand gets a sensor `<body>_sand` of its wrench: force, then
+    moment about the body's origin, world frame.
+
+    Args:
+        spec: The model; changed in place.
+        sand: The medium, see `make_sand`.
+        law: A law or its name.
+        bodies: Names of the bodies that feel the sand; by default each that can move and has geoms.
+        surface: The free surface, or its height [m].
+        plane: Normal of the vertical plane of motion, for the 2D laws.
+        geoms: Which geoms bound a body: those that can collide, or all.
+        max_edge: Longest edge of a triangle [m]; by default a sixth of each geom's size.
+        wheels: Driven wheels, behind which the dynamic laws let the free surface drop: names, whose axis is then that
+            of their hinge and whose radius that of their surface; or `Wheel` by name.
+        disable_floor: Take collision from planes at the sand's level, which would support the bodies a second time.
+        allow_open: Accept meshes that are not closed.
+        sensors: Add the sensors.
+        draw: Draw the free surface as a translucent plane.
+        name: Name of the bed, where a model has several.
+
+    Returns:
+        What was modelled.
+
+    Raises:
+        RftsimError: The scene cannot have sand: unknown bodies, surfaces that bound nothing, flags that would skip it.
+    """
+    plugin.register()
+    bed_sand, bed_law = make_sand(sand), get_law(law)
+    free_surface = surface if isinstance(surface, FreeSurface) else FreeSurface(height=surface)
+    numbers = packed.pack_sand(bed_sand, bed_law, free_surface, plane)
+    _name_bodies(spec)
+    model = _compiled(spec)
+    _check_options(model, bed_sand)
+    surfaces, reasons = _surfaces(model, bodies, geoms == "collision", max_edge, allow_open)
+    if bed_law.dynamic:
+        surfaces |= _with_wheels(model, surfaces, wheels)
+    notes = [note for one in surfaces.values() for note in one.notes]
+    notes += _floors(spec, model, surfaces, free_surface, disable_floor)
+    _write(spec, name, numbers, surfaces, sensors)
+    if draw:
+        _draw(spec, name, free_surface)
+    for note in notes:
+        warnings.warn(note, RftsimWarning, stacklevel=2)
+    return Bed(name, bed_sand, bed_law, free_surface, surfaces, reasons, tuple(notes))
+
+
+def load(
+    source: "str | Path",
+    sand: "Sand | str | Mapping[str, Any]" = "poppy-seeds",
+    law: "Law | str" = "rft3d",
+    **options: Any,
+) -> mujoco.MjModel:
+    """A compiled model with sand under it.
+
+    Args:
+        source: Path of an MJCF or URDF file, or the XML itself.
+        sand: The medium, see `make_sand`.
+        law: A law or its name.
+        **options: Those of `add_sand`.
+
+    Raises:
+        RftsimError: The file is missing, or the scene cannot have sand.
+        ValueError: MuJoCo cannot compile the model.
+    """
+    spec = read_spec(source)
+    add_sand(spec, sand, law, **options)
+    return spec.compile()
+
+
+def read_spec(source: "str | Path") -> mujoco.MjSpec:
+    """A model from a path or from XML.
+
+    Raises:
+        SceneError: The file is missing.
+    """
+    if isinstance(source, str) and source.lstrip().startswith("<"):
+        return mujoco.MjSpec.from_string(source)
+    if not Path(source).is_file():
+        raise SceneError(f"no model file {source}")
+    return mujoco.MjSpec.from_file(str(source))
+
+
+def _compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
+    """The spec's model, from a copy so that the spec stays uncompiled."""
+    return spec.copy().compile()
+
+
+def _name_bodies(spec: mujoco.MjSpec) -> None:
+    taken = {body.name for body in spec.bodies}
+    for number, body in enumerate(spec.bodies):
+        if not body.name:
+            body.name = next(n for k in range(len(taken) + 1) if (n := f"body{number + k}") not in taken)
+            taken.add(body.name)
+
+
+def _check_options(model: mujoco.MjModel, sand: Sand) -> None:
+    spring, damper = mujoco.mjtDisableBit.mjDSBL_SPRING, mujoco.mjtDisableBit.mjDSBL_DAMPER
+    if model.opt.disableflags & spring and model.opt.disableflags & damper:
+        raise SceneError(
+            'the model has <flag spring="disable" damper="disable"/>, with which MuJoCo skips all passive forces, the '
+            "sand's too: enable one of them"
+        )
+    if model.opt.enableflags & mujoco.mjtEnableBit.mjENBL_SLEEP:
+        raise SceneError(
+            'the model has <flag sleep="enable"/>, under which sand would pile up on sleeping bodies: disable it'
+        )
+    gravity = float(np.linalg.norm(model.opt.gravity))
+    if abs(gravity - sand.g) > 0.02 * sand.g:
+        warnings.warn(
+            f"the model's gravity is {gravity:.3g} m/s^2 and the sand's strength belongs to {sand.g:.3g}: if the sand "
+            f"is under the model's gravity, pass sand.replace(g={gravity:.4g}), which scales it",
+            RftsimWarning,
+            stacklevel=3,
+        )
+
+
+def _surfaces(
+    model: mujoco.MjModel, bodies: Iterable[str] | None, collision_only: bool, max_edge: float | None, allow_open: bool
+) -> tuple[dict[str, Surface], dict[str, str]]:
+    names = [model.body(i).name for i in range(model.nbody)]
+    chosen = None if bodies is None else set(bodies)
+    for unknown in sorted((chosen or set()) - set(names)):
+        near = difflib.get_close_matches(unknown, names, 3, 0.0)
+        raise SceneError(f"no body {unknown!r}; near are {', '.join(near)}")
+    surfaces: dict[str, Surface] = {}
+    reasons: dict[str, str] = {}
+    for i, name in enumerate(names):
+        if i == 0:
+            continue
+        if chosen is not None and name not in chosen:
+            reasons[name] = "not among the bodies asked for"
+            continue
+        if model.body_weldid[i] == 0:
+            reasons[name] = "cannot move"
+        elif model.body_plugin[i] >= 0:
+            reasons[name] = "has another plugin, or sand already"
+        else:
+            found = body_surface(model, i, collision_only=collision_only, max_edge=max_edge, allow_open=allow_open)
+            if found is None:
+                reasons[name] = "has no geom that collides" if model.body_geomnum[i] else "has no geom"
+            else:
+                surfaces[name] = found
+                reasons[name] = f"moves, {found.ntri} triangles"
+                continue
+        if chosen is not None:
+            raise SceneError(f"body {name!r} cannot feel the sand: it {reasons[name]}")
+    if not surfaces:
+        found_none = "; ".join(f"{name}: {reason}" for name, reason in reasons.items()) or "the model has no bodies"
+        raise SceneError(
+            f"no body would feel the sand ({found_none}). Bodies need geoms that collide, or geoms='all'; "
+            '<compiler discardvisual="true"/> deletes the others'
+        )
+    return surfaces, reasons
+
+
+def _with_wheels(
+    model: mujoco.MjModel, surfaces: Mapping[str, Surface], wheels: "Mapping[str, Wheel] | Iterable[str]"
+) -> dict[str, Surface]:
+    named = dict(wheels) if isinstance(wheels, Mapping) else dict.fromkeys(wheels)
+    found = {}
+    for name, wheel in named.items():
+        if name not in surfaces:
+            raise SceneError(f"wheel {name!r} does not feel the sand; bodies that do are {', '.join(surfaces)}")
+        found[name] = dataclasses.replace(surfaces[name], wheel=wheel or _hinged_wheel(model, name, surfaces[name]))
+    return found
+
+
+def _hinged_wheel(model: mujoco.MjModel, name: str, surface: Surface) -> Wheel:
+    body = model.body(name)
+    for joint in range(body.jntadr[0], body.jntadr[0] + body.jntnum[0]):
+        if model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE:
+            axis, centre = model.jnt_axis[joint], model.jnt_pos[joint]
+            reach = surface.triangles.reshape(-1, 3) - centre
+            radius = float(np.linalg.norm(reach - np.outer(reach @ axis, axis), axis=1).max())
+            return Wheel(tuple(axis.tolist()), tuple(centre.tolist()), radius)
+    raise SceneError(f"wheel {name!r} has no hinge to turn about: give its Wheel(axis, centre, radius)")
+
+
+def _floors(
+    spec: mujoco.MjSpec,
+    model: mujoco.MjModel,
+    surfaces: Mapping[str, Surface],
+    free_surface: FreeSurface,
+    disable: bool,
+) -> list[str]:
+    """Find planes that would support the bodies a second time; take their collision where asked, else say so."""
+    reach = max(surface.size for surface in surfaces.values())
+    normal = np.array(free_surface.normal)
+    notes = []
+    for geom in range(model.ngeom):
+        kind = _GEOM(model.geom_type[geom])
+        if kind not in (_GEOM.mjGEOM_PLANE, _GEOM.mjGEOM_HFIELD) or not is_colliding(model, geom):
+            continue
+        if model.body_weldid[model.geom_bodyid[geom]] != 0:
+            continue
+        depth = free_surface.offset - normal @ model.geom_pos[geom]
+        if depth > reach:
+            continue
+        if disable:
+            element = spec.geoms[geom]
+            element.contype = element.conaffinity = 0
+        else:
+            notes.append(
+                f"{geom_label(model, geom)} lies {depth:.3g} m below the sand's surface and collides: it supports the "
+                "bodies a second time. Take its collision away (disable_floor=True) or lower it"
+            )
+    return notes
+
+
+def _write(spec: mujoco.MjSpec, name: str, numbers: np.ndarray, surfaces: Mapping[str, Surface], sensors: bool) -> None:
+    taken = {p.name for p in spec.plugins}
+    if name in taken:
+        raise SceneError(f"the model has a plugin instance {name!r} already: give this bed another name")
+    spec.activate_plugin(plugin.PLUGIN)
+    instance = spec.add_plugin(name=name, plugin_name=plugin.PLUGIN, active=True)
+    spec.add_numeric(name=plugin.SAND_MARKER + name, data=numbers, size=numbers.size)
+    for body_name, surface in surfaces.items():
+        body = spec.body(body_name)
+        _attach(body.plugin, instance)
+        data = packed.pack_surface(surface)
+        spec.add_numeric(name=plugin.BODY_MARKER + body_name, data=data, size=data.size)
+        if sensors:
+            sensor = spec.add_sensor(
+                name=f"{body_name}_sand",
+                type=mujoco.mjtSensor.mjSENS_PLUGIN,
+                objtype=mujoco.mjtObj.mjOBJ_BODY,
+                objname=body_name,
+            )
+            _attach(sensor.plugin, instance)
+
+
+def _attach(element: Any, instance: Any) -> None:
+    element.name, element.plugin_name, element.active = instance.name, plugin.PLUGIN, True
+
+
+def _draw(spec: mujoco.MjSpec, name: str, free_surface: FreeSurface) -> None:
+    normal = free_surface.normal
+    half = 0.5 * math.acos(min(normal[2], 1.0))
+    length = math.hypot(normal[0], normal[1]) or 1.0
+    quat = [math.cos(half), -math.sin(half) * normal[1] / length, math.sin(half) * normal[0] / length, 0.0]
+    spec.worldbody.add_geom(
+        name=f"{name}_surface",
+        type=_GEOM.mjGEOM_PLANE,
+        size=[0, 0, 0.1],
+        pos=[0, 0, free_surface.height],
+        quat=quat,
+        contype=0,
+        conaffinity=0,
+        rgba=SAND_RGBA,
+    )

@@ -1,0 +1,234 @@
+"""The surface of a body as the sand sees it: triangles, checked closed and outward."""
+
+import dataclasses
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import trimesh
+from numpy.typing import ArrayLike, NDArray
+
+from rftsim.errors import SurfaceError
+
+Array = NDArray[np.float64]
+
+EDGE_ON_DOUBLE: Final = 1e-9
+EDGE_ON_SINGLE: Final = 1e-6
+"""Leading-edge tolerance on n.v_hat: rounding of normals computed in double, or from MuJoCo's single precision."""
+
+LARGEST: Final = 20.0
+SMALLEST: Final = 1e-3
+"""Body sizes [m] outside of which a mesh is suspected to be in other units."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Wheel:
+    """What the structural term needs to know of a driven wheel; in the body frame.
+
+    Attributes:
+        axis: Axis of rotation, a unit vector; positive spin about it rolls the wheel along axis x up.
+        centre: A point on the axis [m].
+        radius: Outer radius r of delta h = r (r omega^2 / g) [m].
+    """
+
+    axis: tuple[float, float, float]
+    centre: tuple[float, float, float]
+    radius: float
+
+    def __post_init__(self) -> None:
+        length = float(np.linalg.norm(self.axis))
+        if not length > 0.0 or not self.radius > 0.0:
+            raise ValueError(f"a wheel needs an axis and a positive radius, not {self.axis} and {self.radius}")
+        object.__setattr__(self, "axis", tuple(float(a) / length for a in self.axis))
+
+
+@dataclasses.dataclass(frozen=True)
+class Surface:
+    """Triangles that the sand can press on, in the body frame.
+
+    Attributes:
+        triangles: Corners [m], shape (ntri, 3, 3), counter-clockwise seen from outside.
+        edge_on: Leading-edge tolerance: n.v_hat down to minus this counts as leading.
+        wheel: Set where the body is a wheel to the structural term.
+        notes: What was found and repaired, one sentence each.
+    """
+
+    triangles: Array
+    edge_on: float = EDGE_ON_DOUBLE
+    wheel: Wheel | None = None
+    notes: tuple[str, ...] = ()
+    centres: Array = dataclasses.field(init=False)
+    """Centroids [m], shape (ntri, 3)."""
+    normals: Array = dataclasses.field(init=False)
+    """Outward unit normals, shape (ntri, 3)."""
+    areas: Array = dataclasses.field(init=False)
+    """Areas [m^2], shape (ntri,)."""
+
+    def __post_init__(self) -> None:
+        a, b, c = np.moveaxis(self.triangles, 1, 0)
+        cross = np.cross(b - a, c - a)
+        double = np.linalg.norm(cross, axis=1)
+        object.__setattr__(self, "centres", (a + b + c) / 3.0)
+        object.__setattr__(self, "normals", cross / double[:, None])
+        object.__setattr__(self, "areas", double / 2.0)
+
+    @property
+    def ntri(self) -> int:
+        """Number of triangles."""
+        return len(self.areas)
+
+    @property
+    def size(self) -> float:
+        """Largest extent along an axis [m]."""
+        points = self.triangles.reshape(-1, 3)
+        return float(np.ptp(points, axis=0).max())
+
+    def moved(self, rotation: ArrayLike, translation: ArrayLike) -> "Surface":
+        """The surface after x -> rotation x + translation."""
+        return dataclasses.replace(self, triangles=self.triangles @ np.asarray(rotation).T + np.asarray(translation))
+
+    def refined(self, max_edge: float) -> "Surface":
+        """The surface with its triangles split until no edge exceeds max_edge [m]."""
+        if not max_edge > 0.0:
+            raise ValueError(f"max_edge must be positive, not {max_edge:g}")
+        vertices = self.triangles.reshape(-1, 3)
+        faces = np.arange(len(vertices)).reshape(-1, 3)
+        needed = np.linalg.norm(np.diff(self.triangles, axis=1, append=self.triangles[:, :1]), axis=2).max()
+        levels = max(int(np.ceil(np.log2(max(needed / max_edge, 1.0)))) + 1, 1)
+        vertices, faces = trimesh.remesh.subdivide_to_size(vertices, faces, max_edge, max_iter=levels)
+        return dataclasses.replace(self, triangles=vertices[faces])
+
+
+def joined(surfaces: "list[Surface]") -> Surface:
+    """Several surfaces of one body as one."""
+    return Surface(
+        triangles=np.concatenate([s.triangles for s in surfaces]),
+        edge_on=max(s.edge_on for s in surfaces),
+        notes=tuple(note for s in surfaces for note in s.notes),
+    )
+
+
+def make_surface(
+    vertices: ArrayLike,
+    faces: ArrayLike,
+    *,
+    name: str = "mesh",
+    allow_open: bool = False,
+    edge_on: float = EDGE_ON_DOUBLE,
+) -> Surface:
+    """A checked surface from vertices [m], (nvert, 3), and faces, (nface, 3).
+
+    Faces of no area and repeated faces are dropped, inconsistent or inward winding is turned; each is noted.
+
+    Raises:
+        SurfaceError: No faces, a vertex that is not finite, or a surface that is not closed (unless allow_open).
+    """
+    points = np.asarray(vertices, dtype=float).reshape(-1, 3)
+    corners = np.asarray(faces, dtype=int).reshape(-1, 3)
+    if not len(corners):
+        raise SurfaceError(f"{name} has no faces; the sand needs a closed triangle mesh")
+    if corners.min() < 0 or corners.max() >= len(points):
+        raise SurfaceError(f"{name}: a face refers to vertex {corners.max()}, and there are {len(points)}")
+    bad = ~np.isfinite(points[corners]).all(axis=(1, 2))
+    if bad.any():
+        raise SurfaceError(f"{name}: face {int(np.argmax(bad))} has a vertex that is not finite")
+    notes: list[str] = []
+    mesh = trimesh.Trimesh(points, corners, process=False)
+    mesh.merge_vertices(merge_tex=True, merge_norm=True)
+    _drop(mesh, mesh.area_faces > 1e-14 * mesh.scale**2, f"{name}: dropped %d faces of no area", notes)
+    unique = np.zeros(len(mesh.faces), dtype=bool)
+    unique[np.unique(np.sort(mesh.faces, axis=1), axis=0, return_index=True)[1]] = True
+    _drop(mesh, unique, f"{name}: dropped %d repeated faces", notes)
+    if not len(mesh.faces):
+        raise SurfaceError(f"{name} has no face with an area; the sand needs a closed triangle mesh")
+    _wind(mesh, name, notes)
+    open_face = _open_face(mesh.faces)
+    if open_face is not None:
+        text = (
+            f"{name} is open at face {open_face} of {len(mesh.faces)}, near {_point(mesh.triangles_center[open_face])}"
+        )
+        if not allow_open:
+            raise SurfaceError(f"{text}: close it, or allow open meshes (then only its outer side is felt)")
+        notes.append(text)
+    size = float(np.ptp(mesh.vertices, axis=0).max())
+    if not SMALLEST <= size <= LARGEST:
+        notes.append(
+            f"{name} is {size:g} m in size; lengths are in metres"
+            + (f": a mesh in millimetres needs scale 0.001 ({size / 1000:g} m)" if size > LARGEST else "")
+        )
+    return Surface(np.array(mesh.triangles, dtype=float), edge_on=edge_on, notes=tuple(notes))
+
+
+def load_surface(path: "str | Path", *, scale: float = 1.0, allow_open: bool = False) -> Surface:
+    """A checked surface from a mesh file of any kind that trimesh reads.
+
+    Raises:
+        SurfaceError: The file is missing, is not a mesh, or does not bound a body.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise SurfaceError(f"no mesh file {path}")
+    if not (np.isfinite(scale) and scale > 0.0):
+        raise SurfaceError(f"the mesh scale must be positive, not {scale:g}")
+    try:
+        mesh = trimesh.load_mesh(path, process=False)
+    except Exception as error:  # trimesh's readers raise whatever their parsers raise
+        raise SurfaceError(f"cannot read the mesh {path}: {type(error).__name__}: {error}") from error
+    if not isinstance(mesh, trimesh.Trimesh):
+        raise SurfaceError(f"{path} holds no triangle mesh")
+    return make_surface(mesh.vertices * scale, mesh.faces, name=path.name, allow_open=allow_open)
+
+
+def _point(x: ArrayLike) -> str:
+    return "(" + ", ".join(f"{value:.4g}" for value in np.asarray(x)) + ")"
+
+
+def _drop(mesh: trimesh.Trimesh, keep: NDArray[np.bool_], note: str, notes: list[str]) -> None:
+    if not keep.all():
+        mesh.update_faces(keep)
+        notes.append(note % np.count_nonzero(~keep))
+
+
+def _wind(mesh: trimesh.Trimesh, name: str, notes: list[str]) -> None:
+    """Make the winding consistent, and each shell outward unless another shell encloses it."""
+    before = mesh.faces.copy()
+    if _open_face(mesh.faces) is not None:
+        trimesh.repair.fix_winding(mesh)
+    labels = trimesh.graph.connected_component_labels(mesh.face_adjacency, node_count=len(mesh.faces))
+    faces = mesh.faces.copy()
+    shells = [np.flatnonzero(labels == label) for label in range(labels.max() + 1)]
+    boxes = [(mesh.triangles[s].min(axis=(0, 1)), mesh.triangles[s].max(axis=(0, 1))) for s in shells]
+    for shell, (low, high) in zip(shells, boxes, strict=True):
+        volume = np.einsum("ij,ij->", mesh.triangles_center[shell], np.cross(*_edges(mesh.triangles[shell]))) / 6.0
+        inside = any((low > other_low).all() and (high < other_high).all() for other_low, other_high in boxes)
+        if volume < 0.0 and not inside:
+            faces[shell] = faces[shell][:, ::-1]
+    mesh.faces = faces
+    turned = int((np.sort(before, axis=1) != np.sort(faces, axis=1)).any(axis=1).sum())
+    assert turned == 0, "winding must not change which vertices a face joins"
+    flipped = int((_cyclic(before) != _cyclic(faces)).any(axis=1).sum())
+    if flipped:
+        notes.append(f"{name}: turned {flipped} of {len(faces)} faces outward")
+
+
+def _edges(triangles: Array) -> tuple[Array, Array]:
+    return triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+
+
+def _cyclic(faces: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Faces rotated so that the smallest vertex comes first, which leaves the winding."""
+    start = np.argmin(faces, axis=1)[:, None]
+    return np.take_along_axis(faces, (start + np.arange(3)) % 3, axis=1)
+
+
+def _open_face(faces: NDArray[np.int64]) -> int | None:
+    """A face one of whose directed edges has no opposite, or None where the surface is closed."""
+    tail, head = faces[:, [0, 1, 2]].ravel(), faces[:, [1, 2, 0]].ravel()
+    n = int(faces.max()) + 1
+    codes, counts = np.unique(np.concatenate([tail * n + head, head * n + tail]), return_counts=True)
+    forward = np.zeros(len(codes), dtype=int)
+    np.add.at(forward, np.searchsorted(codes, tail * n + head), 1)
+    unbalanced = codes[2 * forward != counts]
+    if not len(unbalanced):
+        return None
+    return int(np.argmax(np.isin(tail * n + head, unbalanced))) // 3
