@@ -88,7 +88,7 @@ def wrenches(model: mujoco.MjModel, data: mujoco.MjData) -> Wrenches:
     for bed in instances(model):
         for body, wrench in plugin.stored_wrenches(int(data.plugin_data[bed.id])):
             force[body], moment[body] = wrench[:3], wrench[3:]
-    velocity, omega = _twists(model, data)
+    velocity, omega = body_velocities(model, data)
     return Wrenches(force, moment, np.einsum("ij,ij->i", force, velocity) + np.einsum("ij,ij->i", moment, omega))
 
 
@@ -105,7 +105,7 @@ def tractions(model: mujoco.MjModel, data: mujoco.MjData, body: "int | str") -> 
     else:
         raise SceneError(f"body {model.body(index).name!r} does not feel sand")
     surface = bed.bodies[index]
-    velocity, omega = _twists(model, data)
+    velocity, omega = body_velocities(model, data)
     rotation = data.xmat[index].reshape(3, 3)
     stress, depth = packed.tractions(
         bed.sand, surface, data.xpos[index], data.xmat[index], velocity[index], omega[index]
@@ -122,7 +122,7 @@ def tractions(model: mujoco.MjModel, data: mujoco.MjData, body: "int | str") -> 
     )
 
 
-def _twists(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[Array, Array]:
+def body_velocities(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[Array, Array]:
     """Velocity of each body's origin and angular velocity, world frame, (nbody, 3) each."""
     omega = data.cvel[:, :3]  # MuJoCo's cvel: angular first
     arm = data.xpos - data.subtree_com[model.body_rootid]

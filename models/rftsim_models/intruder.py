@@ -1,0 +1,70 @@
+"""A rigid intruder of any shape: dropped, dragged or drilled."""
+
+from typing import Final, Literal, get_args
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike
+
+Motion = Literal["drop", "drag", "drill"]
+MOTIONS: Final = get_args(Motion)
+INTRUDER: Final = "intruder"
+SERVO: Final = 1e5
+"""Gain of the rate servos: [N s/m] and [N m s]."""
+
+
+def build_intruder(
+    vertices: ArrayLike,
+    faces: ArrayLike,
+    *,
+    motion: Motion = "drop",
+    density: float = 1000.0,
+    height: float = 0.0,
+    speed: float = 0.1,
+    rate: float = 0.0,
+    gravity: float = 9.81,
+) -> mujoco.MjSpec:
+    """An intruder whose own origin starts at a height above z = 0 [m].
+
+    Args:
+        vertices: Of its mesh [m], (nvert, 3).
+        faces: (nface, 3).
+        motion: `drop`: free; `drag`: at a speed along x, its height held; `drill`: downward at a speed, turning about
+            the vertical at a rate.
+        density: [kg/m^3].
+        height: Of the mesh's origin above the ground [m].
+        speed: Imposed speed [m/s].
+        rate: Imposed angular rate about the vertical [rad/s].
+        gravity: [m/s^2].
+
+    Raises:
+        ValueError: No such motion, or a density that is not positive.
+    """
+    if motion not in MOTIONS:
+        raise ValueError(f"no motion {motion!r}; motions are {', '.join(MOTIONS)}")
+    if not density > 0.0:
+        raise ValueError(f"density must be positive, not {density}")
+    spec = mujoco.MjSpec()
+    spec.modelname = INTRUDER
+    spec.option.gravity = [0, 0, -gravity]
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.timestep = 2e-4
+    spec.worldbody.add_light(pos=[0, -1, 2], dir=[0, 0.5, -1], type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL)
+    points = np.asarray(vertices, dtype=float)
+    spec.add_mesh(name=INTRUDER, uservert=points.ravel(), userface=np.asarray(faces).ravel())
+    body = spec.worldbody.add_body(name=INTRUDER, pos=[0, 0, height])
+    body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=INTRUDER, density=density, rgba=[0.35, 0.40, 0.48, 1])
+    if motion == "drop":
+        body.add_freejoint(name="free")
+        return spec
+    slide, hinge = mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE
+    imposed = [("x", slide, [1, 0, 0], speed)]
+    if motion == "drill":
+        imposed = [("z", slide, [0, 0, 1], -speed), ("yaw", hinge, [0, 0, 1], rate)]
+    for name, kind, axis, _ in imposed:
+        body.add_joint(name=name, type=kind, axis=axis)
+        servo = spec.add_actuator(name=name, trntype=mujoco.mjtTrn.mjTRN_JOINT, target=name)
+        servo.set_to_velocity(kv=SERVO)
+    values = [value for *_, value in imposed]
+    spec.add_key(name="start", qvel=values, ctrl=values)
+    return spec

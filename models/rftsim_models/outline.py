@@ -1,0 +1,84 @@
+"""Closed outlines in the x-z plane, and the solids that they extrude to."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Faces = NDArray[np.int64]
+
+
+def lugged_outline(radius: float, lugs: int, height: float, width: float, *, arc: int, flank: int, top: int) -> Array:
+    """Outline of a disc with rectangular lugs, (n, 2), counter-clockwise seen from -y (x right, z up).
+
+    Args:
+        radius: Radius of the disc [m].
+        lugs: Number of lugs, evenly spaced.
+        height: Radial height of a lug above the disc [m]; zero for a plain disc.
+        width: Width of a lug [m].
+        arc: Segments of the disc between two lugs.
+        flank: Segments of a lug's side.
+        top: Segments of a lug's outer end.
+    """
+    half = math.asin(width / 2 / radius)
+    pitch = 2 * math.pi / lugs
+    foot = radius * math.cos(half)
+    points: list[tuple[float, float]] = []
+    for lug in range(lugs):
+        centre = lug * pitch
+        out = np.array([math.cos(centre), math.sin(centre)])
+        side = np.array([-out[1], out[0]])
+        corners = [(foot, -1.0), (radius + height, -1.0), (radius + height, 1.0), (foot, 1.0)]
+        for (r0, s0), (r1, s1), n in zip(corners[:-1], corners[1:], (flank, top, flank), strict=True):
+            for k in range(n):
+                r, s = r0 + (r1 - r0) * k / n, s0 + (s1 - s0) * k / n
+                points.append(tuple(r * out + s * width / 2 * side))
+        start, end = centre + half, centre + pitch - half
+        for k in range(arc):
+            angle = start + (end - start) * k / arc
+            points.append((radius * math.cos(angle), radius * math.sin(angle)))
+    return np.array(points)
+
+
+def extruded(outline: Array, width: float, *, rings: int = 1, strips: int = 1) -> tuple[Array, Faces]:
+    """The solid that an outline, star-shaped about the origin, sweeps along y: vertices and outward faces.
+
+    Args:
+        outline: (n, 2), x and z, counter-clockwise seen from -y.
+        width: Extent along y, centred [m].
+        rings: Rings of triangles in each of the two side faces.
+        strips: Strips of triangles across the width.
+    """
+    n = len(outline)
+    vertices: list[Array] = []
+    faces: list[tuple[int, int, int]] = []
+    y = np.linspace(-width / 2, width / 2, strips + 1)
+    for level in y:
+        vertices.append(np.column_stack([outline[:, 0], np.full(n, level), outline[:, 1]]))
+    for strip in range(strips):
+        faces += _band(strip * n, (strip + 1) * n, n)
+    for level, first, outward in ((y[0], 0, False), (y[-1], strips * n, True)):
+        outer = first
+        for ring in range(1, rings):
+            scale = 1.0 - ring / rings
+            inner = sum(map(len, vertices))
+            vertices.append(np.column_stack([scale * outline[:, 0], np.full(n, level), scale * outline[:, 1]]))
+            faces += [face if outward else face[::-1] for face in _band(outer, inner, n)]
+            outer = inner
+        hub = sum(map(len, vertices))
+        vertices.append(np.array([[0.0, level, 0.0]]))
+        for k in range(n):
+            a, b = outer + k, outer + (k + 1) % n
+            faces.append((b, a, hub) if outward else (a, b, hub))
+    return np.concatenate(vertices), np.array(faces)
+
+
+def _band(first: int, second: int, n: int) -> list[tuple[int, int, int]]:
+    """Triangles between two rings of n vertices."""
+    faces = []
+    for k in range(n):
+        a, b = first + k, first + (k + 1) % n
+        c, d = second + (k + 1) % n, second + k
+        faces += [(a, c, b), (a, d, c)]
+    return faces

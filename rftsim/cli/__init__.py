@@ -1,0 +1,3 @@
+"""The command line."""
+
+from rftsim.cli.main import main

@@ -1,0 +1,48 @@
+"""`rftsim`: every command, and how its errors end."""
+
+import sys
+import warnings
+from typing import Annotated, Any
+
+import tyro
+from rich.console import Console
+
+from rftsim.cli.demo import Demo
+from rftsim.cli.force import Force
+from rftsim.cli.inspect import Inspect
+from rftsim.cli.run import Run
+from rftsim.errors import RftsimError, RftsimWarning
+
+Command = (
+    Annotated[Force, tyro.conf.subcommand("force")]
+    | Annotated[Run, tyro.conf.subcommand("run")]
+    | Annotated[Inspect, tyro.conf.subcommand("inspect")]
+    | Annotated[Demo, tyro.conf.subcommand("demo")]
+)
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run one command; exits with 2 where its input cannot be."""
+    console = Console(stderr=True)
+    command: Any = tyro.cli(
+        Command,
+        prog="rftsim",
+        description="Sand for MuJoCo: granular resistive forces on the bodies of any model.",
+        args=arguments,
+        config=(tyro.conf.OmitArgPrefixes,),
+    )
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", RftsimWarning)
+        try:
+            command(lambda: said(caught))
+        except (RftsimError, ValueError, OSError) as error:
+            console.print(f"[red]error:[/red] {error}", highlight=False, soft_wrap=True)
+            sys.exit(2)
+        finally:
+            for text in said(caught):
+                console.print(f"[yellow]warning:[/yellow] {text}", highlight=False, soft_wrap=True)
+
+
+def said(caught: list[warnings.WarningMessage]) -> list[str]:
+    """The distinct warnings, in order."""
+    return list(dict.fromkeys(str(warning.message) for warning in caught))

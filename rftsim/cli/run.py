@@ -1,0 +1,116 @@
+"""`rftsim run`: a shipped scene or somebody's MJCF, on sand."""
+
+import contextlib
+import dataclasses
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import mujoco
+import tyro
+from rich.console import Console
+from rich.progress import Progress
+
+from rftsim.cli.inspect import Settings, settings
+from rftsim.cli.output import check_writable, print_json, replacing
+from rftsim.plots import plot_history
+from rftsim.run import SAMPLES, run
+from rftsim.run import Run as Finished
+from rftsim.scenes import Staged, stage
+
+
+@dataclasses.dataclass(frozen=True)
+class Run:
+    """Run a scene on sand and report its steady state: means over the last 40 %.
+
+    Example: rftsim run grouser-wheel --set rpm=60 --plot wheel.png --record wheel.rrd
+    """
+
+    scene: tyro.conf.Positional[str]
+    """A shipped scene (grouser-wheel, half-grouser-wheel, four-flap-runner, intruder) or an MJCF file."""
+    law: str | None = None
+    """Instead of the scene's law."""
+    sand: str | None = None
+    """Instead of the scene's sand: a preset, key=value,... or a TOML file."""
+    set: Settings = ()
+    """Settings of a shipped scene, key=value ...; may be repeated."""
+    duration: float | None = None
+    """Simulated time [s]."""
+    timestep: float | None = None
+    """[s]."""
+    record: Path | None = None
+    """Write a Rerun recording, .rrd."""
+    plot: Path | None = None
+    """Draw the run, .png, .pdf or .svg."""
+    disable_floor: bool = False
+    """Take collision from planes at the sand's level."""
+    allow_open: bool = False
+    """Accept meshes that are not closed."""
+    json: bool = False
+    """Print JSON."""
+
+    def __call__(self, warnings: Callable[[], list[str]]) -> None:
+        """Run and report."""
+        if self.record:
+            check_writable(self.record, ".rrd")
+        if self.plot:
+            check_writable(self.plot, ".png", ".pdf", ".svg")
+        staged = stage(
+            self.scene,
+            sand=self.sand,
+            law=self.law,
+            settings=settings(self.set),
+            timestep=self.timestep,
+            duration=self.duration,
+            disable_floor=self.disable_floor,
+            allow_open=self.allow_open,
+        )
+        finished = self._simulate(staged)
+        if self.plot:
+            with replacing(self.plot) as temporary:
+                plot_history(finished.history, f"{self.scene}, {staged.bed.law.name}", temporary)
+        steady = finished.steady
+        report = {
+            "scene": self.scene,
+            "law": staged.bed.law.name,
+            "sand": dataclasses.asdict(staged.bed.sand),
+            "timestep_s": float(staged.model.opt.timestep),
+            "duration_s": staged.duration,
+            "speed_m_s": steady.speed,
+            "sinkage_m": steady.sinkage,
+            "slip": steady.slip,
+            "rate_rad_s": steady.rate,
+            "realtime_factor": finished.realtime_factor,
+            "warnings": [*warnings(), *finished.doubts],
+        }
+        if self.json:
+            print_json(report)
+            return
+        console = Console()
+        slip = "" if steady.slip is None else f", slip {steady.slip:.3f}"
+        console.print(f"[bold]{self.scene}[/bold], law {report['law']}, {staged.duration:g} s", highlight=False)
+        console.print(f"speed {steady.speed:.4g} m/s, sinkage {steady.sinkage:.4g} m{slip}")
+        console.print(f"{finished.realtime_factor:.3g} times real time")
+        for doubt in finished.doubts:
+            console.print(f"[yellow]warning:[/yellow] {doubt}", highlight=False, soft_wrap=True)
+        for path in (self.plot, self.record):
+            if path:
+                console.print(f"wrote {path}", highlight=False)
+
+    def _simulate(self, staged: Staged) -> Finished:
+        samples = min(SAMPLES, math.ceil(staged.duration / staged.model.opt.timestep))
+        with Progress(console=Console(stderr=True), transient=True, disable=self.json) as progress:
+            task = progress.add_task(self.scene, total=samples)
+            with contextlib.ExitStack() as stack:
+                recorder = None
+                if self.record is not None:
+                    from rftsim.record import Recorder  # rerun is an extra
+
+                    recorder = stack.enter_context(Recorder(staged.model, self.record))
+
+                def observe(data: mujoco.MjData) -> None:
+                    progress.advance(task)
+                    if recorder is not None:
+                        recorder.log(data)
+
+                return run(staged, observe)

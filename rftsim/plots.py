@@ -1,0 +1,54 @@
+"""Pictures of runs."""
+
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from rftsim.demo import Point
+from rftsim.run import STEADY, History
+
+
+def plot_history(history: History, title: str, path: Path) -> None:
+    """Draw speed, sinkage, force and power against time."""
+    figure = Figure(figsize=(8, 9), layout="constrained")
+    axes = figure.subplots(4, 1, sharex=True)
+    axes[0].plot(history.time, history.speed)
+    axes[0].set_ylabel("speed [m/s]")
+    axes[1].plot(history.time, 1000 * history.sinkage)
+    axes[1].set_ylabel("sinkage [mm]")
+    for component, name in enumerate("xyz"):
+        axes[2].plot(history.time, history.force[:, component], label=f"F{name}")
+    axes[2].set_ylabel("force of the sand [N]")
+    axes[2].legend(loc="upper right", ncols=3)
+    axes[3].plot(history.time, history.power)
+    axes[3].set_ylabel("power of the sand [W]")
+    axes[3].set_xlabel("time [s]")
+    for axis in axes:
+        axis.axvspan(history.time[int(len(history.time) * (1 - STEADY))], history.time[-1], color="0.93", zorder=0)
+        axis.grid(alpha=0.3)
+    axes[0].set_title(f"{title} (grey: steady state)")
+    figure.savefig(path, dpi=110)
+
+
+def plot_demo(points: list[Point], path: Path) -> None:
+    """Draw speed and sinkage against spin, a column per scene, as [Agarwal] Figs. 4-7 and 4-9 do."""
+    scenes = list(dict.fromkeys(point.scene for point in points))
+    figure = Figure(figsize=(11, 7.5), layout="constrained")
+    axes = figure.subplots(2, len(scenes), sharex="col", squeeze=False)
+    styles = {"rft2d": ("C0", "--"), "drft2d": ("C0", "-"), "rft3d": ("C1", "--"), "drft3d": ("C1", "-")}
+    for column, scene in enumerate(scenes):
+        for law, (colour, line) in styles.items():
+            own = [point for point in points if point.scene == scene and point.law == law]
+            spin = [point.spin for point in own]
+            options = {"color": colour, "linestyle": line, "marker": "o", "markersize": 4, "label": law}
+            axes[0, column].plot(spin, [point.speed for point in own], **options)
+            axes[1, column].plot(spin, [point.sinkage for point in own], **options)
+        axes[0, column].set_title(scene)
+        axes[0, column].set_ylabel("speed  $v/\\sqrt{g\\ell}$")
+        axes[1, column].set_ylabel("sinkage  $z/\\ell$")
+        axes[1, column].set_xlabel("spin  $\\omega/\\sqrt{g/\\ell}$")
+    for axis in axes.flat:
+        axis.grid(alpha=0.3)
+        axis.legend()
+    figure.suptitle("Wheels on loose poppy seeds: quasi-static (dashed) and dynamic (solid) laws")
+    figure.savefig(path, dpi=110)
