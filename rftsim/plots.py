@@ -2,9 +2,12 @@
 
 from pathlib import Path
 
+import matplotlib.image
+import mujoco
 from matplotlib.figure import Figure
 
 from rftsim.demo import Point
+from rftsim.render import render, watching
 from rftsim.run import STEADY, History
 
 
@@ -52,3 +55,11 @@ def plot_demo(points: list[Point], path: Path) -> None:
         axis.legend()
     figure.suptitle("Wheels on loose poppy seeds: quasi-static (dashed) and dynamic (solid) laws")
     figure.savefig(path, dpi=110)
+
+
+def save_picture(model: mujoco.MjModel, data: mujoco.MjData, body: str, path: Path) -> None:
+    """Render a model, looking at a body, with arrows for the sand's traction."""
+    mujoco.mj_forward(model, data)
+    camera = watching(model, data, body)
+    picture = render(model, data, camera=camera, arrows=camera.distance / 10)
+    matplotlib.image.imsave(path, picture)

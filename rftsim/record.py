@@ -5,7 +5,7 @@ import os
 import types
 import uuid
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, Final, NamedTuple, Self
 
@@ -21,7 +21,6 @@ from rftsim import packed
 from rftsim.errors import RftsimError, SceneError
 from rftsim.geometry import body_surface, geom_triangles, is_colliding
 from rftsim.readout import Instance, instances, tractions, wrenches
-from rftsim.scene import SAND_RGBA
 from rftsim.surface import Array
 
 BLOCK: Final = 64
@@ -29,21 +28,26 @@ BLOCK: Final = 64
 OWN_PATHS: Final = ("world", "sand", "speed", "about")
 """First elements of the paths that the recorder itself writes."""
 INACTIVE: Final = (150, 150, 150)
-STOPS: Final = ((255, 255, 178), (254, 204, 92), (253, 141, 60), (240, 59, 32), (189, 0, 38))
-"""Traction from none to the strongest, evenly spaced, ever darker: ColorBrewer's YlOrRd."""
+STOPS: Final = ((252, 197, 192), (250, 159, 181), (247, 104, 161), (197, 27, 138), (122, 1, 119))
+"""Traction from none to the strongest, evenly spaced, ever darker: ColorBrewer's RdPu."""
+SAND: Final = (0.76, 0.70, 0.50, 0.3)
 GRID_CELLS: Final = 16
 """Along each side of the drawn sand."""
-_TINY: Final = 1e-12
+ABOUT: Final = """
+**Arrows**: the sand's force, {arrow:.3g} m long per `sand/scale/force`: the weight, {weight:.3g} N, or a third of the
+largest force so far if that is more. **Colours**: traction, light to dark up to `sand/scale/traction`: the largest so
+far, at first the weight over the area, {pressure:.3g} Pa; grey where the sand does not act. **Grid**: {cell:g} m.
+"""
 
 
 class Recorder:
     """Writes one MuJoCo simulation to a Rerun file.
 
     Under `world`: the geoms (not planes and height fields, which have no end), the surfaces that feel the sand coloured
-    by traction, per body an arrow of the sand's force and a thin one of its moment, and the sand's surface, which
-    follows the bodies in whole cells of its grid. Under `sand`: force [N], moment about the body's origin [N m] and
-    depth of the deepest triangle [m] of each body, total power [W], and the scales of arrows and colours. Under
-    `speed`: that of each root body [m/s]. All are those of the last mj_forward or mj_step of the data.
+    by traction, an arrow of the sand's force on each body, and the sand's surface, which follows the bodies in whole
+    cells of its grid. Under `sand`: force [N], moment about the body's origin [N m] and depth of the deepest
+    triangle [m] of each body, total power [W], and the scales of arrows and colours. Under `speed`: that of each root
+    body [m/s]. All are those of the last mj_forward or mj_step of the data.
 
     The file appears at `close`, after it was read back and found complete. An exception inside the with-block closes
     the recording too: its frames show what went wrong. When a reset turns time back, the recording goes on one period
@@ -72,8 +76,9 @@ class Recorder:
         self._model, self._period, self._last, self._shift = model, 1.0 / fps, -math.inf, 0.0
         self._beds = instances(model)
         self._skins = [_make_skin(model, body, surface) for bed in self._beds for body, surface in bed.bodies.items()]
-        self._arrow, self._cell = model.stat.extent / 3.0, _round_number(model.stat.extent / 3.0)
-        self._force_scale, self._traction_scale = _first_scales(model, self._beds)
+        self._arrow = _extent(model) / 3.0
+        self._cell = _round_number(self._arrow)
+        self._scale = _first_scale(model, self._beds)
         self._file = _File(self.path, application_id)
         self._log_static()
         self._open_channels()
@@ -125,70 +130,65 @@ class Recorder:
 
     def _log_static(self) -> None:
         model, log = self._model, self._file.log_static
+        weight, pressure = self._scale
+        about = ABOUT.format(arrow=self._arrow, weight=weight, pressure=pressure, cell=self._cell)
+        log("/about", rr.TextDocument(about, media_type="text/markdown"))
         log("/world", rr.ViewCoordinates.RIGHT_HAND_Z_UP)
-        log("/about", rr.TextDocument(self._about(), media_type="text/markdown"))
-        skinned = {geom for skin in self._skins for geom in skin.geoms}
-        felt = {skin.body for skin in self._skins}
-        for geom in set(range(model.ngeom)) - skinned:
-            body = int(model.geom_bodyid[geom])
-            mesh = _geom_mesh(model, geom, see_through=body in felt)
-            if mesh is not None:
-                log(_body_entity(model, body) + _entity(model.geom(geom).name or f"geom{geom}"), mesh)
         for bed in self._beds:
-            log(_entity("world", "sand", bed.name), *_ground_shape(bed.sand, self._cell))
-        components = rr.SeriesLines(names=["x", "y", "z"], colors=[(230, 80, 80), (90, 190, 90), (90, 140, 250)])
+            log(_entity("world", "sand", bed.name), *_sand_shape(bed.sand, self._cell))
         for skin in self._skins:
             name = _name(model, skin.body)
-            log(_body_entity(model, skin.body) + "/skin", _mesh(skin.triangles))
-            log(_entity("sand", "force", name), components)
-            log(_entity("sand", "moment", name), components)
-            thick, thin = 0.05 * self._arrow, 0.02 * self._arrow
-            log(_entity("world", "force", name), rr.Arrows3D.from_fields(radii=thick, colors=(40, 120, 255)))
-            log(_entity("world", "moment", name), rr.Arrows3D.from_fields(radii=thin, colors=(190, 90, 230)))
-
-    def _about(self) -> str:
-        return (
-            f"**Arrows**: the sand's force, {self._arrow:.3g} m long for the largest so far (plot `sand/scale/force`; at "
-            f"first the weight, {self._force_scale:.3g} N); thin, its moment over that force, in metres as drawn. "
-            f"**Colours**: traction, from pale to dark red for the largest so far (`sand/scale/traction`; at first the "
-            f"weight over the area, {self._traction_scale:.3g} Pa); grey where the sand does not act. "
-            f"**Grid**: {self._cell:g} m."
-        )
+            log(_entity("world", "body", name, "skin"), _mesh(skin.triangles))
+            log(_entity("world", "force", name), rr.Arrows3D.from_fields(radii=0.03 * self._arrow, colors=0x2878FFFF))
+            for quantity in ("force", "moment"):
+                log(_entity("sand", quantity, name), rr.SeriesLines(names=[f"{name} {axis}" for axis in "xyz"]))
+        skinned, felt = {geom for skin in self._skins for geom in skin.geoms}, {skin.body for skin in self._skins}
+        for geom in range(model.ngeom):
+            body = int(model.geom_bodyid[geom])
+            mesh = None if geom in skinned else _geom_mesh(model, geom, opacity=0.3 if body in felt else 1.0)
+            if mesh is not None:
+                log(_entity("world", "body", _name(model, body), model.geom(geom).name or f"geom{geom}"), mesh)
 
     def _open_channels(self) -> None:
-        """Room for a block of frames of all that changes, and which entity shows which part."""
+        """Room for a block of frames of all that changes, and what shows which part of it."""
         model, show, nfelt = self._model, self._file.show, len(self._skins)
         self._felt = [skin.body for skin in self._skins]
         self._roots = np.unique(model.body_rootid[self._felt or slice(1, None)]).tolist()
-        self._pose = np.empty((BLOCK, model.nbody, 7))
-        self._speed = np.empty((BLOCK, len(self._roots)))
-        self._ground = np.empty((BLOCK, len(self._beds), 3))
-        self._force, self._moment = np.empty((2, BLOCK, nfelt, 3))
-        self._force_arrow, self._moment_arrow = np.empty((2, BLOCK, nfelt, 2, 3))
-        self._depth, self._power, self._scales = np.empty((BLOCK, nfelt)), np.empty(BLOCK), np.empty((BLOCK, 2))
+        self._position, self._quaternion = np.empty((BLOCK, model.nbody, 3)), np.empty((BLOCK, model.nbody, 4))
+        self._speed, self._power, self._scales = (
+            np.empty((BLOCK, len(self._roots))),
+            np.empty(BLOCK),
+            np.empty((BLOCK, 2)),
+        )
+        self._ground, self._depth = np.empty((BLOCK, len(self._beds), 3)), np.empty((BLOCK, nfelt))
+        self._force, self._moment, self._arrows = np.empty((3, BLOCK, nfelt, 3))
         self._colours = [np.empty((BLOCK, len(skin.nearest), 3), dtype=np.uint32) for skin in self._skins]
-        for body in range(1, model.nbody):
-            show(_body_entity(model, body), self._pose[:, body], _pose_columns)
+        for i in range(1, model.nbody):
+            pose = {"translation": self._position[:, i], "quaternion": self._quaternion[:, i]}
+            show(_entity("world", "body", _name(model, i)), rr.Transform3D, **pose)
         for i, root in enumerate(self._roots):
-            show(_entity("speed", _name(model, root)), self._speed[:, i], _scalar_columns)
+            show(_entity("speed", _name(model, root)), rr.Scalars, scalars=self._speed[:, i])
         for i, bed in enumerate(self._beds):
-            show(_entity("world", "sand", bed.name), self._ground[:, i], _place_columns)
+            show(_entity("world", "sand", bed.name), rr.Transform3D, translation=self._ground[:, i])
         for i, body in enumerate(self._felt):
             name = _name(model, body)
-            show(_entity("sand", "force", name), self._force[:, i], _scalar_columns)
-            show(_entity("sand", "moment", name), self._moment[:, i], _scalar_columns)
-            show(_entity("sand", "depth", name), self._depth[:, i], _scalar_columns)
-            show(_entity("world", "force", name), self._force_arrow[:, i], _arrow_columns)
-            show(_entity("world", "moment", name), self._moment_arrow[:, i], _arrow_columns)
-            show(_body_entity(model, body) + "/skin", self._colours[i], _colour_columns)
+            for quantity, values in ("force", self._force), ("moment", self._moment), ("depth", self._depth):
+                show(_entity("sand", quantity, name), rr.Scalars, scalars=values[:, i])
+            show(
+                _entity("world", "force", name),
+                rr.Arrows3D,
+                origins=self._position[:, body],
+                vectors=self._arrows[:, i],
+            )
+            show(_entity("world", "body", name, "skin"), rr.Mesh3D, vertex_colors=self._colours[i])
         if nfelt:
-            show("/sand/power", self._power, _scalar_columns)
-            show("/sand/scale/force", self._scales[:, 0], _scalar_columns)
-            show("/sand/scale/traction", self._scales[:, 1], _scalar_columns)
+            show("/sand/power", rr.Scalars, scalars=self._power)
+            show("/sand/scale/force", rr.Scalars, scalars=self._scales[:, 0])
+            show("/sand/scale/traction", rr.Scalars, scalars=self._scales[:, 1])
 
     def _fill(self, data: mujoco.MjData, k: int) -> None:
         """Set frame k of the block."""
-        self._pose[k, :, :3], self._pose[k, :, 3:] = data.xpos, data.xquat
+        self._position[k], self._quaternion[k] = data.xpos, data.xquat[:, [1, 2, 3, 0]]  # MuJoCo's wxyz to Rerun's xyzw
         self._speed[k] = [_speed(self._model, data, root) for root in self._roots]
         for i, bed in enumerate(self._beds):
             self._ground[k, i] = _snapped(data.xpos[list(bed.bodies)].mean(axis=0), bed.sand, self._cell)
@@ -197,33 +197,48 @@ class Recorder:
         sand = wrenches(self._model, data)
         found = [tractions(self._model, data, body) for body in self._felt]
         magnitudes = [np.linalg.norm(one.stress, axis=1) for one in found]
-        self._force_scale = max(self._force_scale, float(np.linalg.norm(sand.force, axis=1).max()))
-        self._traction_scale = max(self._traction_scale, *(float(one.max()) for one in magnitudes))
+        self._scale = _Scale(
+            max(self._scale.force, np.linalg.norm(sand.force, axis=1).max() / 3.0),
+            max(self._scale.traction, *(one.max() for one in magnitudes)),
+        )
         self._force[k], self._moment[k] = sand.force[self._felt], sand.moment[self._felt]
-        self._force_arrow[k, :, 0] = self._moment_arrow[k, :, 0] = data.xpos[self._felt]
-        self._force_arrow[k, :, 1] = self._force[k] * (self._arrow / self._force_scale)
-        self._moment_arrow[k, :, 1] = self._moment[k] / self._force_scale
+        self._arrows[k] = self._force[k] * (self._arrow / self._scale.force)
         self._depth[k] = [one.depth.max() for one in found]
-        self._power[k] = sand.power.sum()
-        self._scales[k] = self._force_scale, self._traction_scale
+        self._power[k], self._scales[k] = sand.power.sum(), self._scale
         for skin, colours, one, magnitude in zip(self._skins, self._colours, found, magnitudes, strict=True):
-            colours[k] = traction_colours(magnitude, one.active, self._traction_scale)[skin.nearest, None]
+            colours[k] = traction_colours(magnitude, one.active, self._scale.traction)[skin.nearest, None]
 
 
 def traction_colours(magnitude: Array, active: NDArray[np.bool_], scale: float) -> NDArray[np.uint32]:
-    """Colours 0xRRGGBBAA of tractions [Pa] up to scale; grey where they are not active, or not numbers."""
+    """Colours 0xRRGGBBAA of tractions [Pa] up to scale, (ntri,); grey where they are not active, or not numbers."""
     shade = np.where(active & (magnitude <= scale), 1.0 + 254.0 / scale * magnitude, 0.0)
     return _PALETTE[shade.astype(np.intp)]
 
 
 def _palette() -> NDArray[np.uint32]:
+    """Inactive, then 255 shades."""
     places, at = np.linspace(0.0, 1.0, len(STOPS)), np.linspace(0.0, 1.0, 255)
     shades = np.stack([np.interp(at, places, channel) for channel in np.array(STOPS).T], axis=1)
     rgb = np.vstack([INACTIVE, shades.round()]).astype(np.uint32)
-    return (rgb @ np.array([1 << 24, 1 << 16, 1 << 8], dtype=np.uint32) + np.uint32(255)).astype(np.uint32)
+    palette: NDArray[np.uint32] = (rgb[:, 0] << 24) + (rgb[:, 1] << 16) + (rgb[:, 2] << 8) + np.uint32(255)
+    return palette
 
 
 _PALETTE: Final = _palette()
+
+
+class _Scale(NamedTuple):
+    force: float
+    """Of an arrow a third of the model's extent long [N]."""
+    traction: float
+    """Of the strongest colour [Pa]."""
+
+
+def _first_scale(model: mujoco.MjModel, beds: Iterable[Instance]) -> _Scale:
+    """The weight of all that can move, and that over the area that feels sand."""
+    weight = float(model.body_mass[model.body_weldid != 0].sum() * np.linalg.norm(model.opt.gravity))
+    area = sum(float(_columns(surface)[6].sum()) for bed in beds for surface in bed.bodies.values())
+    return _Scale(max(weight, 1e-12), max(weight, 1e-12) / (area or 1.0))
 
 
 class _Skin(NamedTuple):
@@ -244,24 +259,19 @@ def _make_skin(model: mujoco.MjModel, body: int, surface: Array) -> _Skin:
     for collision_only in (True, False):
         drawn = body_surface(model, body, collision_only=collision_only, max_edge=None, allow_open=True)
         geoms = [geom for geom in own if is_colliding(model, geom) or not collision_only]
-        if drawn is not None and np.allclose(
-            [*drawn.triangles.min((0, 1)), *drawn.triangles.max((0, 1))], surface[1:7]
+        if drawn and np.allclose(
+            [drawn.triangles.min((0, 1)), drawn.triangles.max((0, 1))], surface[1:7].reshape(2, 3)
         ):
             break
     assert drawn is not None, "a body that feels sand has geoms"
-    columns = surface[packed.HEADER :].reshape(packed.COLUMNS, -1)
-    weights = np.array([1.0, 1.0, 1.0, *[drawn.size] * 3])  # so that thin plates keep their two sides apart
-    tree = cKDTree(columns[:6].T * weights)
-    _, nearest = tree.query(np.hstack([drawn.centres, drawn.normals]) * weights)
+    weights = np.array([1.0, 1.0, 1.0, *[drawn.size] * 3])  # normals too, so that thin plates keep their sides apart
+    _, nearest = cKDTree(_columns(surface)[:6].T * weights).query(np.hstack([drawn.centres, drawn.normals]) * weights)
     return _Skin(body, geoms, drawn.triangles, nearest)
 
 
-def _first_scales(model: mujoco.MjModel, beds: Iterable[Instance]) -> tuple[float, float]:
-    """Weight of all that can move [N], and that weight over the area that feels sand [Pa]."""
-    weight = float(model.body_mass[model.body_weldid != 0].sum() * np.linalg.norm(model.opt.gravity))
-    columns = [one[packed.HEADER :].reshape(packed.COLUMNS, -1) for bed in beds for one in bed.bodies.values()]
-    area = float(sum(one[6].sum() for one in columns))
-    return max(weight, _TINY), max(weight / max(area, _TINY), _TINY)
+def _columns(surface: Array) -> Array:
+    """Of a packed surface: centre (3), normal (3), area; shape (COLUMNS, ntri)."""
+    return surface[packed.HEADER :].reshape(packed.COLUMNS, -1)
 
 
 def _speed(model: mujoco.MjModel, data: mujoco.MjData, body: int) -> float:
@@ -271,133 +281,95 @@ def _speed(model: mujoco.MjModel, data: mujoco.MjData, body: int) -> float:
     return float(np.linalg.norm(velocity[3:]))
 
 
-def _plane_axes(sand: Array) -> tuple[Array, Array, Array]:
+def _axes(sand: Array) -> tuple[Array, Array, Array]:
     """Of a packed sand: along its surface, across, and up."""
     up = sand[3:6]
-    along = np.array([up[2], 0.0, -up[0]])
-    along /= np.linalg.norm(along)
+    along = np.array([up[2], 0.0, -up[0]]) / math.hypot(up[2], up[0])
     return along, np.cross(up, along), up
 
 
 def _snapped(place: Array, sand: Array, cell: float) -> Array:
     """The corner of the sand's grid nearest to a place."""
-    along, across, up = _plane_axes(sand)
-    i, j = round(float(place @ along) / cell), round(float(place @ across) / cell)
-    return np.asarray(sand[6] * up + cell * (i * along + j * across))
+    along, across, up = _axes(sand)
+    snapped: Array = sand[6] * up + cell * (
+        np.rint(place @ along / cell) * along + np.rint(place @ across / cell) * across
+    )
+    return snapped
 
 
 def _round_number(x: float) -> float:
     """The largest of 1, 2, 5 times a power of ten that does not exceed x."""
     power = 10.0 ** math.floor(math.log10(x))
-    return max(one * power for one in (1.0, 2.0, 5.0) if one * power <= x)
+    return max(digit * power for digit in (1.0, 2.0, 5.0) if digit * power <= x)
 
 
-def _ground_shape(sand: Array, cell: float) -> tuple[rr.Mesh3D, rr.LineStrips3D]:
-    along, across, _ = _plane_axes(sand)
-    half = GRID_CELLS // 2 * cell
+def _sand_shape(sand: Array, cell: float) -> tuple[rr.Mesh3D, rr.LineStrips3D]:
+    """A translucent square about the origin, and the grid on it."""
+    along, across, _ = _axes(sand)
+    half = GRID_CELLS / 2 * cell
     corners = [half * (i * along + j * across) for i, j in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
-    at = np.linspace(-half, half, GRID_CELLS + 1)
-    lines = [
-        [x * one - half * other, x * one + half * other]
+    grid = [
+        [offset * one - half * other, offset * one + half * other]
         for one, other in ((along, across), (across, along))
-        for x in at
+        for offset in np.linspace(-half, half, GRID_CELLS + 1)
     ]
-    return (
-        rr.Mesh3D(vertex_positions=corners, triangle_indices=[[0, 1, 2], [0, 2, 3]], albedo_factor=SAND_RGBA),
-        rr.LineStrips3D(lines, colors=[(*SAND_RGBA[:3], 0.8)], radii=rr.Radius.ui_points(0.5)),
-    )
+    mesh = rr.Mesh3D(vertex_positions=corners, triangle_indices=[[0, 1, 2], [0, 2, 3]], albedo_factor=SAND)
+    return mesh, rr.LineStrips3D(grid, colors=SAND, radii=rr.Radius.ui_points(0.5))
 
 
-def _geom_mesh(model: mujoco.MjModel, geom: int, see_through: bool) -> rr.Mesh3D | None:
+def _geom_mesh(model: mujoco.MjModel, geom: int, opacity: float) -> rr.Mesh3D | None:
     """The geom in its body's frame; None where it is invisible or endless."""
-    rgba = _geom_rgba(model, geom)
+    rgba, material = model.geom_rgba[geom], model.geom_matid[geom]
+    if material >= 0 and (rgba == (0.5, 0.5, 0.5, 1.0)).all():  # MuJoCo's rule: the default gives way
+        rgba = model.mat_rgba[material]
     try:
         vertices, faces = geom_triangles(model, geom)
     except SceneError:
         return None
-    if rgba[3] == 0.0:
-        return None
     rotation = np.empty(9)
     mujoco.mju_quat2Mat(rotation, model.geom_quat[geom])
     placed = vertices @ rotation.reshape(3, 3).T + model.geom_pos[geom]
-    return _mesh(placed[faces], rgba * [1.0, 1.0, 1.0, 0.3 if see_through else 1.0])
-
-
-def _geom_rgba(model: mujoco.MjModel, geom: int) -> Array:
-    """As MuJoCo draws it: its own colour where it is not the default, else its material's."""
-    rgba, material = model.geom_rgba[geom], model.geom_matid[geom]
-    if material >= 0 and (rgba == (0.5, 0.5, 0.5, 1.0)).all():
-        rgba = model.mat_rgba[material]
-    return rgba.astype(float)
+    return _mesh(placed[faces], rgba * [1.0, 1.0, 1.0, opacity]) if rgba[3] else None
 
 
 def _mesh(triangles: Array, rgba: Array | None = None) -> rr.Mesh3D:
-    """Flat-shaded triangles, (n, 3, 3), that share no corners, so that each face can have its colour."""
+    """Triangles, (n, 3, 3), that share no corners: shaded flat, and each can have its colour."""
     a, b, c = np.moveaxis(triangles, 1, 0)
     cross = np.cross(b - a, c - a)
-    normals = cross / np.maximum(np.linalg.norm(cross, axis=1, keepdims=True), _TINY**2)
+    normals = cross / np.maximum(np.linalg.norm(cross, axis=1, keepdims=True), 1e-30)
     return rr.Mesh3D(
         vertex_positions=triangles.reshape(-1, 3), vertex_normals=np.repeat(normals, 3, axis=0), albedo_factor=rgba
     )
-
-
-def _entity(*parts: str) -> str:
-    return rr.new_entity_path(list(parts))
 
 
 def _name(model: mujoco.MjModel, body: int) -> str:
     return model.body(body).name or f"body{body}"
 
 
-def _body_entity(model: mujoco.MjModel, body: int) -> str:
-    return _entity("world", "body", _name(model, body))
+def _entity(*parts: str) -> str:
+    return rr.new_entity_path(list(parts))
 
 
 def _scalar_entity(path: str) -> str:
     parts = path.strip("/").split("/")
     if parts[0] in OWN_PATHS or not all(parts):
-        raise RftsimError(f"a scalar's path cannot be {path!r}: give a group and a name, not of {', '.join(OWN_PATHS)}")
+        raise RftsimError(
+            f"a scalar's path is a group and a name, the group not of {', '.join(OWN_PATHS)}; not {path!r}"
+        )
     return _entity(*parts)
 
 
-def _scalar_columns(values: NDArray[Any]) -> Iterable[Any]:
-    return rr.Scalars.columns(scalars=values)
-
-
-def _pose_columns(values: NDArray[Any]) -> Iterable[Any]:
-    """MuJoCo's quaternions are wxyz, Rerun's xyzw."""
-    return rr.Transform3D.columns(translation=values[:, :3], quaternion=values[:, [4, 5, 6, 3]])
-
-
-def _place_columns(values: NDArray[Any]) -> Iterable[Any]:
-    return rr.Transform3D.columns(translation=values)
-
-
-def _arrow_columns(values: NDArray[Any]) -> Iterable[Any]:
-    return rr.Arrows3D.columns(origins=values[:, 0], vectors=values[:, 1])
-
-
-def _colour_columns(values: NDArray[Any]) -> Iterable[Any]:
-    frames, corners = len(values), values[0].size
-    return rr.Mesh3D.columns(vertex_colors=values.ravel()).partition([corners] * frames)
-
-
 def _blueprint(model: mujoco.MjModel, with_sand: bool, scalars: Iterable[str]) -> rrb.Blueprint:
-    """The bodies on the left, plots of the sand and of each group of scalars on the right."""
-    extent, centre = model.stat.extent, model.stat.center
-    eye = rrb.EyeControls3D(position=centre + extent * np.array([0.8, -1.6, 0.8]), look_target=centre)
-    plots = {"/speed": "Speed [m/s]"}
-    if with_sand:
-        names = {"force": "Force of the sand [N]", "power": "Power of the sand [W]", "depth": "Deepest triangle [m]"}
-        plots = {f"/sand/{one}": name for one, name in names.items()} | plots
-    plots |= {f"/{one}": one for one in dict.fromkeys(path.split("/")[1] for path in scalars)}
+    """The bodies on the left; plots of the sand and of each group of scalars on the right."""
+XX
+    view = rrb.Spatial3DView(origin="/world", name="Simulation", eye_controls=eye, line_grid=False)
+    about = rrb.TextDocumentView(origin="/about", name="Scales")
+    plots = {"/sand/force": "Force [N]", "/sand/power": "Power [W]", "/sand/depth": "Depth [m]"} if with_sand else {}
+    plots |= {"/speed": "Speed [m/s]"}
+    plots |= {f"/{group}": group for group in dict.fromkeys(entity.split("/")[1] for entity in scalars)}
     return rrb.Blueprint(
         rrb.Horizontal(
-            rrb.Vertical(
-                rrb.Spatial3DView(origin="/world", name="Simulation", eye_controls=eye, line_grid=False),
-                rrb.TextDocumentView(origin="/about", name="Scales"),
-                row_shares=[6, 1],
-            ),
+            rrb.Vertical(view, about, row_shares=[6, 1]),
             rrb.Vertical(*(rrb.TimeSeriesView(origin=origin, name=name) for origin, name in plots.items())),
             column_shares=[2, 1],
         ),
@@ -411,10 +383,9 @@ class _Channel(NamedTuple):
     """What one entity shows, frame by frame."""
 
     entity: str
-    values: NDArray[Any]
-    """Shape (BLOCK, ...)."""
-    columns: Callable[[NDArray[Any]], Iterable[Any]]
-    """Rerun's columns of some of the values."""
+    archetype: Any
+    fields: dict[str, NDArray[Any]]
+    """Arrays of a block's frames, (BLOCK, ...)."""
 
 
 class _File:
@@ -425,19 +396,18 @@ class _File:
         self.scalars: dict[str, list[tuple[float, float]]] = {}
         """Time [s] and value of each, since the last block."""
         self._path, self._temporary = path, _reserved(path)
-        self._time, self._channels = np.empty(BLOCK), list[_Channel]()
-        self._rows: Counter[str] = Counter()
+        self._time, self._channels, self._rows = np.empty(BLOCK), list[_Channel](), Counter[str]()
         self._stream = rr.RecordingStream(application_id, recording_id=uuid.uuid4())
         self._stream.save(self._temporary)
         self._stream.send_recording_name(path.stem)
 
-    def log_static(self, entity: str, *shown: Any) -> None:
+    def log_static(self, entity: str, *shown: rr.AsComponents) -> None:
         self._stream.log(entity, *shown, static=True)
         self._rows[entity] += 1
 
-    def show(self, entity: str, values: NDArray[Any], columns: Callable[[NDArray[Any]], Iterable[Any]]) -> None:
-        """Let an entity show an array of a block's frames, (BLOCK, ...), which the caller fills at `pending`."""
-        self._channels.append(_Channel(entity, values, columns))
+    def show(self, entity: str, archetype: Any, **fields: NDArray[Any]) -> None:
+        """Let an entity show arrays, (BLOCK, ...), of which the caller fills row `pending` before `end_frame`."""
+        self._channels.append(_Channel(entity, archetype, fields))
 
     def end_frame(self, time: float, scalars: Mapping[str, float]) -> None:
         for entity, value in scalars.items():
@@ -459,17 +429,19 @@ class _File:
             self._temporary.unlink(missing_ok=True)
 
     def _send_block(self) -> None:
-        if self.pending:
-            for channel in self._channels:
-                self._send(channel.entity, self._time[: self.pending], channel.columns(channel.values[: self.pending]))
+        n, self.pending = self.pending, 0
+        if not n:
+            return
+        for channel in self._channels:
+            fields = {field: values[:n] for field, values in channel.fields.items()}
+            self._send(channel.entity, self._time[:n], channel.archetype.columns(**fields))
         for entity, pairs in self.scalars.items():
             if pairs:
                 time, values = np.array(pairs).T
-                self._send(entity, time, _scalar_columns(values))
+                self._send(entity, time, rr.Scalars.columns(scalars=values))
                 pairs.clear()
-        self.pending = 0
 
-    def _send(self, entity: str, time: Array, columns: Iterable[Any]) -> None:
+    def _send(self, entity: str, time: Array, columns: Any) -> None:
         self._stream.send_columns(entity, [rr.TimeColumn("sim_time", duration=time)], columns)
         self._rows[entity] += len(time)
 
@@ -477,11 +449,11 @@ class _File:
 def _reserved(path: Path) -> Path:
     """An empty file beside the path, which shows that it can be written."""
     if path.suffix != ".rrd":
-        raise RftsimError(f"a recording is called *.rrd, by which Rerun knows it, not {path.name!r}")
+        raise RftsimError(f"a recording must be called *.rrd, by which Rerun knows it, not {path.name!r}")
     temporary = path.with_name(f".{path.stem}-{uuid.uuid4().hex[:8]}.rrd")
     try:
         if path.exists() and not (path.is_file() and os.access(path, os.W_OK)):
-            raise RftsimError(f"cannot write {path}: it exists and is no file that may be replaced")
+            raise RftsimError(f"cannot write {path}: it exists and is not a file that may be replaced")
         temporary.touch(exist_ok=False)
     except OSError as error:
         raise RftsimError(f"cannot write {path}: {error.strerror}") from error
@@ -495,10 +467,10 @@ def _check_rows(written: Path, sent: Mapping[str, int], path: Path) -> None:
         for chunk in RrdReader(written).stream():
             found[chunk.entity_path] += chunk.num_rows
     except (OSError, ValueError, RuntimeError) as error:
-        raise RftsimError(f"the recording for {path} cannot be read back, is the disk full? {error}") from error
+        raise RftsimError(f"the recording {path} cannot be read back; is the disk full? {error}") from error
     missing = {entity: rows - found[entity] for entity, rows in sent.items() if found[entity] < rows}
     if missing:
         raise RftsimError(
-            f"the recording for {path} lacks {sum(missing.values())} of {sum(sent.values())} rows, in {len(missing)} "
-            f"entities, first in {next(iter(missing))}: is the disk full?"
+            f"the recording {path} lacks {sum(missing.values())} of {sum(sent.values())} rows, among them of "
+            f"{next(iter(missing))}; is the disk full?"
         )

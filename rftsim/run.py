@@ -59,6 +59,8 @@ class Run(NamedTuple):
     """Simulated over elapsed time, of the steps alone."""
     doubts: tuple[str, ...]
     """Where the run left the theory's range, with numbers."""
+    last: mujoco.MjData
+    """The data at the end."""
 
 
 class RunError(RftsimError):
@@ -114,7 +116,7 @@ def steps(staged: Staged) -> Generator[mujoco.MjData, None, Run]:
     columns = [np.array(column) for column in zip(*rows, strict=True)]
     history = History(*columns)
     doubts = tuple(dict.fromkeys(_worst(checks)))
-    return Run(history, _steady(history, measured.wheel_radius), staged.duration / elapsed, doubts)
+    return Run(history, _steady(history, measured.wheel_radius), staged.duration / elapsed, doubts, data)
 
 
 def _row(

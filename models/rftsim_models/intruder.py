@@ -6,6 +6,8 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rftsim_models.studio import furnish
+
 Motion = Literal["drop", "drag", "drill"]
 MOTIONS: Final = get_args(Motion)
 INTRUDER: Final = "intruder"
@@ -49,11 +51,11 @@ def build_intruder(
     spec.option.gravity = [0, 0, -gravity]
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.timestep = 2e-4
-    spec.worldbody.add_light(pos=[0, -1, 2], dir=[0, 0.5, -1], type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL)
+    furnish(spec)
     points = np.asarray(vertices, dtype=float)
     spec.add_mesh(name=INTRUDER, uservert=points.ravel(), userface=np.asarray(faces).ravel())
     body = spec.worldbody.add_body(name=INTRUDER, pos=[0, 0, height])
-    body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=INTRUDER, density=density, rgba=[0.35, 0.40, 0.48, 1])
+    body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=INTRUDER, density=density, rgba=[0.55, 0.60, 0.68, 1])
     if motion == "drop":
         body.add_freejoint(name="free")
         return spec

@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 
 from rftsim_models.outline import Array, extruded, lugged_outline
+from rftsim_models.studio import furnish
 
 WHEEL: Final = "wheel"
 CARRIAGE: Final = "carriage"
@@ -139,9 +140,7 @@ def build_wheel(parameters: WheelParameters, rpm: float) -> mujoco.MjSpec:
     spec.option.gravity = [0, 0, -parameters.gravity]
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.timestep = 2e-4
-    spec.visual.global_.offwidth, spec.visual.global_.offheight = 1280, 720
-    spec.worldbody.add_light(pos=[0, -1, 2], dir=[0, 0.5, -1], type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL)
-    width = min(parameters.width, 4 * parameters.outer_radius)
+    furnish(spec)
     for name, felt in (("felt", True), ("looks", False)):
         vertices, faces = extruded(parameters.outline(felt), parameters.width, rings=parameters.rings)
         spec.add_mesh(name=name, uservert=vertices.ravel(), userface=faces.ravel())
@@ -150,7 +149,6 @@ def build_wheel(parameters: WheelParameters, rpm: float) -> mujoco.MjSpec:
     _weigh(carriage, max(parameters.horizontal_mass - parameters.vertical_mass, 1e-6), 0.1)
     carriage.add_joint(name="x", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[1, 0, 0])
     carriage.gravcomp = 1
-    carriage.add_camera(name="side", pos=[0, -3.5 * width - 0.4, 0.15], xyaxes=[1, 0, 0, 0, 0.1, 1])
     wheel = carriage.add_body(name=WHEEL)
     _weigh(wheel, parameters.vertical_mass, parameters.radius)
     wheel.add_joint(name="z", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[0, 0, 1])
@@ -164,14 +162,14 @@ def build_wheel(parameters: WheelParameters, rpm: float) -> mujoco.MjSpec:
         group=VISUAL_GROUP,
         contype=0,
         conaffinity=0,
-        rgba=[0.35, 0.40, 0.48, 1],
+        rgba=[0.55, 0.60, 0.68, 1],
     )
     servo = spec.add_actuator(name="rate", trntype=mujoco.mjtTrn.mjTRN_JOINT, target="axle")
     servo.set_to_velocity(kv=SERVO)
     push = spec.add_actuator(name="push", trntype=mujoco.mjtTrn.mjTRN_JOINT, target="x")
     push.set_to_motor()
     rate = rpm * 2 * np.pi / 60
-    rolling = 0.8 * parameters.outer_radius * rate  # near the steady state, which a start from rest takes seconds to reach
+    rolling = 0.8 * parameters.outer_radius * rate  # near the steady state, seconds away from rest
     spec.add_key(name="start", qvel=[rolling, 0, rate], ctrl=[rate, parameters.forward_force])
     sensor = mujoco.mjtSensor
     for name, kind, joint in (

@@ -13,7 +13,7 @@ from rich.progress import Progress
 
 from rftsim.cli.inspect import Settings, settings
 from rftsim.cli.output import check_writable, print_json, replacing
-from rftsim.plots import plot_history
+from rftsim.plots import plot_history, save_picture
 from rftsim.run import SAMPLES, run
 from rftsim.run import Run as Finished
 from rftsim.scenes import Staged, stage
@@ -42,6 +42,8 @@ class Run:
     """Write a Rerun recording, .rrd."""
     plot: Path | None = None
     """Draw the run, .png, .pdf or .svg."""
+    picture: Path | None = None
+    """Render the last moment with the sand's traction as arrows, .png."""
     disable_floor: bool = False
     """Take collision from planes at the sand's level."""
     allow_open: bool = False
@@ -55,6 +57,8 @@ class Run:
             check_writable(self.record, ".rrd")
         if self.plot:
             check_writable(self.plot, ".png", ".pdf", ".svg")
+        if self.picture:
+            check_writable(self.picture, ".png")
         staged = stage(
             self.scene,
             sand=self.sand,
@@ -69,6 +73,9 @@ class Run:
         if self.plot:
             with replacing(self.plot) as temporary:
                 plot_history(finished.history, f"{self.scene}, {staged.bed.law.name}", temporary)
+        if self.picture:
+            with replacing(self.picture) as temporary:
+                save_picture(staged.model, finished.last, staged.measured.body, temporary)
         steady = finished.steady
         report = {
             "scene": self.scene,
@@ -93,7 +100,7 @@ class Run:
         console.print(f"{finished.realtime_factor:.3g} times real time")
         for doubt in finished.doubts:
             console.print(f"[yellow]warning:[/yellow] {doubt}", highlight=False, soft_wrap=True)
-        for path in (self.plot, self.record):
+        for path in (self.plot, self.picture, self.record):
             if path:
                 console.print(f"wrote {path}", highlight=False)
 

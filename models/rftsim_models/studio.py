@@ -1,0 +1,22 @@
+"""Light, sky and frame for pictures of a model."""
+
+import mujoco
+
+
+def furnish(spec: mujoco.MjSpec) -> None:
+    """Give a model a light, a sky, and room for pictures of 1280 x 720."""
+    spec.visual.global_.offwidth, spec.visual.global_.offheight = 1280, 720
+    spec.visual.headlight.ambient = [0.45, 0.45, 0.45]
+    spec.visual.headlight.diffuse = [0.35, 0.35, 0.35]
+    spec.worldbody.add_light(
+        pos=[0, -1, 2], dir=[0.3, 0.6, -1], type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL, diffuse=[0.5, 0.5, 0.5]
+    )
+    spec.add_texture(
+        name="sky",
+        type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
+        rgb1=[0.55, 0.70, 0.88],
+        rgb2=[0.95, 0.96, 0.98],
+        width=256,
+        height=256,
+    )

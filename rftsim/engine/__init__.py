@@ -1,0 +1,1 @@
+"""The coupling to MuJoCo: struct layout, raw memory, and the engine plugin."""
