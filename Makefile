@@ -3,11 +3,12 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 export MUJOCO_GL ?= egl
 
 .PHONY: demo test check unit readme test-slow test-mujoco4 clean
 
-demo: $(VENV)/ready
+demo: $(VENV)/run
 	$(BIN)/rftsim demo
 
 test: check unit readme
@@ -31,19 +32,24 @@ test-slow: $(VENV)/ready
 test-mujoco4: .venv-mujoco4/ready
 	.venv-mujoco4/bin/pytest tests/verification tests/engine
 
-$(VENV)/ready: pyproject.toml constraints.txt
+# What running needs, and then what checking needs.
+$(VENV)/run: pyproject.toml constraints.txt
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "rftsim needs python3 >= 3.11; set PYTHON")'
-	$(PYTHON) -m venv $(VENV)
-	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(PIP) -c constraints.txt -e '.[cli,rerun]'
+	touch $@
+
+$(VENV)/ready: $(VENV)/run
+	$(PIP) -c constraints.txt -e '.[dev]'
 	touch $@
 
 .venv-mujoco4/ready: pyproject.toml constraints.txt
 	$(PYTHON) -m venv .venv-mujoco4
 	grep -v '^mujoco==' constraints.txt > .venv-mujoco4/constraints.txt
-	.venv-mujoco4/bin/pip install --quiet --disable-pip-version-check -c .venv-mujoco4/constraints.txt \
+	.venv-mujoco4/bin/python -m pip install --quiet --disable-pip-version-check -c .venv-mujoco4/constraints.txt \
 		numpy numba trimesh scipy networkx pytest pytest-benchmark hypothesis rich tyro matplotlib
-	.venv-mujoco4/bin/pip install --quiet --disable-pip-version-check mujoco==4.0.0
-	.venv-mujoco4/bin/pip install --quiet --disable-pip-version-check --no-deps -e .
+	.venv-mujoco4/bin/python -m pip install --quiet --disable-pip-version-check mujoco==4.0.0
+	.venv-mujoco4/bin/python -m pip install --quiet --disable-pip-version-check --no-deps -e .
 	touch $@
 
 clean:

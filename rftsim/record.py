@@ -34,9 +34,9 @@ SAND: Final = (0.76, 0.70, 0.50, 0.3)
 GRID_CELLS: Final = 16
 """Along each side of the drawn sand."""
 ABOUT: Final = """
-**Arrows**: the sand's force, {arrow:.3g} m long per `sand/scale/force`: the weight, {weight:.3g} N, or a third of the
-largest force so far if that is more. **Colours**: traction, light to dark up to `sand/scale/traction`: the largest so
-far, at first the weight over the area, {pressure:.3g} Pa; grey where the sand does not act. **Grid**: {cell:g} m.
+**Arrows**: the sand's force, {extent:.3g} m long per `sand/scale/force`: the largest so far, at first the weight,
+{scale.force:.3g} N. **Colours**: traction, light to dark up to `sand/scale/traction`: the largest so far, at first the
+weight over the area, {scale.traction:.3g} Pa; grey where the sand does not act. **Grid**: {cell:g} m.
 """
 
 
@@ -76,8 +76,8 @@ class Recorder:
         self._model, self._period, self._last, self._shift = model, 1.0 / fps, -math.inf, 0.0
         self._beds = instances(model)
         self._skins = [_make_skin(model, body, surface) for bed in self._beds for body, surface in bed.bodies.items()]
-        self._arrow = _extent(model) / 3.0
-        self._cell = _round_number(self._arrow)
+        self._centre, self._extent = _initial_bounds(model)
+        self._cell = _round_number(self._extent / 3.0)
         self._scale = _first_scale(model, self._beds)
         self._file = _File(self.path, application_id)
         self._log_static()
@@ -118,7 +118,8 @@ class Recorder:
             RftsimError: Frames are missing from the file, as on a full disk; what was at the path is left as it was.
         """
         if not self._file.closed:
-            self._file.close(_blueprint(self._model, bool(self._skins), self._file.scalars))
+            follow = _entity("world", "body", _name(self._model, self._roots[0])) if self._roots else None
+            self._file.close(_blueprint(self._centre, self._extent, follow, bool(self._felt), self._file.scalars))
 
     def __enter__(self) -> Self:
         return self
@@ -130,8 +131,7 @@ class Recorder:
 
     def _log_static(self) -> None:
         model, log = self._model, self._file.log_static
-        weight, pressure = self._scale
-        about = ABOUT.format(arrow=self._arrow, weight=weight, pressure=pressure, cell=self._cell)
+        about = ABOUT.format(extent=self._extent, scale=self._scale, cell=self._cell)
         log("/about", rr.TextDocument(about, media_type="text/markdown"))
         log("/world", rr.ViewCoordinates.RIGHT_HAND_Z_UP)
         for bed in self._beds:
@@ -139,7 +139,7 @@ class Recorder:
         for skin in self._skins:
             name = _name(model, skin.body)
             log(_entity("world", "body", name, "skin"), _mesh(skin.triangles))
-            log(_entity("world", "force", name), rr.Arrows3D.from_fields(radii=0.03 * self._arrow, colors=0x2878FFFF))
+            log(_entity("world", "force", name), rr.Arrows3D.from_fields(radii=0.01 * self._extent, colors=0x2878FFFF))
             for quantity in ("force", "moment"):
                 log(_entity("sand", quantity, name), rr.SeriesLines(names=[f"{name} {axis}" for axis in "xyz"]))
         skinned, felt = {geom for skin in self._skins for geom in skin.geoms}, {skin.body for skin in self._skins}
@@ -198,11 +198,11 @@ class Recorder:
         found = [tractions(self._model, data, body) for body in self._felt]
         magnitudes = [np.linalg.norm(one.stress, axis=1) for one in found]
         self._scale = _Scale(
-            max(self._scale.force, np.linalg.norm(sand.force, axis=1).max() / 3.0),
+            max(self._scale.force, np.linalg.norm(sand.force, axis=1).max()),
             max(self._scale.traction, *(one.max() for one in magnitudes)),
         )
         self._force[k], self._moment[k] = sand.force[self._felt], sand.moment[self._felt]
-        self._arrows[k] = self._force[k] * (self._arrow / self._scale.force)
+        self._arrows[k] = self._force[k] * (self._extent / self._scale.force)
         self._depth[k] = [one.depth.max() for one in found]
         self._power[k], self._scales[k] = sand.power.sum(), self._scale
         for skin, colours, one, magnitude in zip(self._skins, self._colours, found, magnitudes, strict=True):
@@ -229,7 +229,7 @@ _PALETTE: Final = _palette()
 
 class _Scale(NamedTuple):
     force: float
-    """Of an arrow a third of the model's extent long [N]."""
+    """Of an arrow as long as the bodies' extent [N]."""
     traction: float
     """Of the strongest colour [Pa]."""
 
@@ -272,6 +272,18 @@ def _make_skin(model: mujoco.MjModel, body: int, surface: Array) -> _Skin:
 def _columns(surface: Array) -> Array:
     """Of a packed surface: centre (3), normal (3), area; shape (COLUMNS, ntri)."""
     return surface[packed.HEADER :].reshape(packed.COLUMNS, -1)
+
+
+def _initial_bounds(model: mujoco.MjModel) -> tuple[Array, float]:
+    """Centre and longest side of a box around the geoms that can move, or all if none can [m]."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    geoms = (model.body_weldid[model.geom_bodyid] != 0) & (model.geom_rbound > 0.0)
+    if not geoms.any():
+        return model.stat.center.copy(), float(model.stat.extent)
+    radii = model.geom_rbound[geoms, None]
+    low, high = (data.geom_xpos[geoms] - radii).min(axis=0), (data.geom_xpos[geoms] + radii).max(axis=0)
+    return 0.5 * (low + high), float((high - low).max())
 
 
 def _speed(model: mujoco.MjModel, data: mujoco.MjData, body: int) -> float:
@@ -359,9 +371,13 @@ def _scalar_entity(path: str) -> str:
     return _entity(*parts)
 
 
-def _blueprint(model: mujoco.MjModel, with_sand: bool, scalars: Iterable[str]) -> rrb.Blueprint:
+def _blueprint(
+    centre: Array, extent: float, follow: str | None, with_sand: bool, scalars: Iterable[str]
+) -> rrb.Blueprint:
     """The bodies on the left; plots of the sand and of each group of scalars on the right."""
-XX
+    eye = rrb.EyeControls3D(
+        position=centre + extent * np.array([0.8, -1.6, 0.8]), look_target=centre, tracking_entity=follow
+    )
     view = rrb.Spatial3DView(origin="/world", name="Simulation", eye_controls=eye, line_grid=False)
     about = rrb.TextDocumentView(origin="/about", name="Scales")
     plots = {"/sand/force": "Force [N]", "/sand/power": "Power [W]", "/sand/depth": "Depth [m]"} if with_sand else {}
