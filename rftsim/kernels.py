@@ -54,7 +54,7 @@ class Medium(NamedTuple):
     lambda_rho: Any
     """lambda rho_c of the inertial term [kg/m^3]; zero for the quasi-static laws."""
     edge_on: Any
-    """n.v_hat down to minus this still counts as leading [-]."""
+    """Rounding of the normals [-]: n.v_hat down to minus this counts as leading, n.up up to this as facing down."""
 
 
 @njit(forceinline=True)
@@ -95,7 +95,7 @@ def _stress_3d(fit: Any, c: Any) -> Any:
         vu = (vx * ux + vy * uy + vz * uz) * inverse
         vn_ = vx * nx + vy * ny + vz * nz
         vn = vn_ * inverse
-        side = 1.0 if nu <= 0.0 else -1.0  # m = side * n faces downward
+        side = 1.0 if nu <= medium.edge_on else -1.0  # m = side * n faces downward; rounding must not choose for a wall
         x1 = -vu
         x2 = -side * nu
         x3 = side * vn
@@ -176,12 +176,12 @@ def _depth(x, y, z, frame):
 
 def _sums(stress: Any) -> Any:
     @njit(fastmath=FASTMATH, error_model="numpy", forceinline=True)
-    def sums(cx, cy, cz, nx, ny, nz, area, frame, medium):
-        """Force [N] and moment [N m] about the body's origin on all triangles, as six numbers."""
+    def sums(cx, cy, cz, nx, ny, nz, area, first, last, frame, medium):
+        """Force [N] and moment [N m] about the body's origin on triangles first to last, as six numbers."""
         v0x, v0y, v0z = frame.v0
         wx, wy, wz = frame.omega
         fx = fy = fz = tx = ty = tz = 0.0
-        for i in range(area.size):
+        for i in range(first, last):
             x, y, z = cx[i], cy[i], cz[i]
             sx, sy, sz = stress(
                 nx[i],

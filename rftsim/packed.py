@@ -27,10 +27,13 @@ HEADER: Final = 16
 """Numbers before the triangles of a packed surface.
 
 0 leading-edge tolerance; 1-3 and 4-6 lowest and highest corner; 7-9 wheel axis, 10-12 wheel centre, 13 wheel radius
-(zero where the body is no wheel); 14-15 unused.
+(zero where the body is no wheel); 14 number of triangles; 15 unused.
 """
 COLUMNS: Final = 7
 """Numbers per triangle, each a column: centre (3), normal (3), area."""
+BLOCK: Final = 64
+"""Triangles that are passed over together where their bounding sphere lies above the sand; the spheres (centre, radius)
+stand behind the columns."""
 
 
 def pack_sand(sand: Sand, law: Law, free_surface: FreeSurface, plane: ArrayLike) -> Array:
@@ -59,13 +62,22 @@ def pack_surface(surface: Surface) -> Array:
     header[1:4], header[4:7] = points.min(axis=0), points.max(axis=0)
     if surface.wheel is not None:
         header[7:10], header[10:13], header[13] = surface.wheel.axis, surface.wheel.centre, surface.wheel.radius
-    return np.concatenate([header, *surface.centres.T, *surface.normals.T, surface.areas])
+    header[14] = surface.ntri
+    return np.concatenate([header, *surface.centres.T, *surface.normals.T, surface.areas, _spheres(surface).ravel()])
+
+
+def _spheres(surface: Surface) -> Array:
+    """Bounding spheres of the centroids of each BLOCK of triangles, (nblock, 4)."""
+    blocks = [surface.centres[start : start + BLOCK] for start in range(0, surface.ntri, BLOCK)]
+    centres = np.array([(block.min(axis=0) + block.max(axis=0)) / 2 for block in blocks])
+    radii = [np.linalg.norm(block - centre, axis=1).max() for block, centre in zip(blocks, centres, strict=True)]
+    return np.column_stack([centres, radii])
 
 
 @njit(forceinline=True)
 def columns(body):
     """The columns of a packed surface: centre (3), normal (3), area; each (ntri,)."""
-    n = (body.size - HEADER) // COLUMNS
+    n = int(body[14])
     start = HEADER
     return (
         body[start : start + n],
@@ -76,6 +88,14 @@ def columns(body):
         body[start + 5 * n : start + 6 * n],
         body[start + 6 * n : start + 7 * n],
     )
+
+
+@njit(forceinline=True)
+def block_is_clear(body, block, frame):
+    """Whether a block of triangles lies wholly above the undisturbed sand."""
+    start = HEADER + COLUMNS * int(body[14]) + 4 * block
+    height = frame.up[0] * body[start] + frame.up[1] * body[start + 1] + frame.up[2] * body[start + 2]
+    return height - body[start + 3] >= frame.height
 
 
 @njit(forceinline=True)
@@ -164,10 +184,14 @@ def _structural(sand, body, frame, plane):
         (along * axis[1] - frame.up[1]) / level,
         (along * axis[2] - frame.up[2]) / level,
     )
-    first, last = 3.0, -3.0
+    first, last, clear = 3.0, -3.0, False
     cx, cy, cz, nx, ny, nz, area = columns(body)
     planar = sand[1]
     for i in range(area.size):
+        if i % BLOCK == 0:
+            clear = block_is_clear(body, i // BLOCK, frame)
+        if clear:
+            continue
         x, y, z = cx[i], cy[i], cz[i]
         depth = frame.height - (frame.up[0] * x + frame.up[1] * y + frame.up[2] * z)
         if depth <= 0.0 or abs(nx[i] * axis[0] + ny[i] * axis[1] + nz[i] * axis[2]) > 0.7:
@@ -190,7 +214,8 @@ def _structural(sand, body, frame, plane):
         c * ahead[2] - s * down[2],
     )
     radius = body[13]
-    return (onward[0], onward[1], onward[2], -_dot(onward, centre)), radius * radius * spin * spin / sand[15]
+    offset = body[0] * radius - _dot(onward, centre)  # rounding must not choose for a triangle on the middle
+    return (onward[0], onward[1], onward[2], offset), radius * radius * spin * spin / sand[15]
 
 
 @njit(forceinline=True)
@@ -217,13 +242,19 @@ def packed_wrench(sand, body, xpos, xmat, velocity, omega):
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     frame = frame_of(sand, body, xpos, xmat, velocity, omega)
     medium = medium_of(sand, body)
+    fx = fy = fz = tx = ty = tz = 0.0
     cx, cy, cz, nx, ny, nz, area = columns(body)
-    if sand[0] == 0.0:
-        fx, fy, fz, tx, ty, tz = kernels.sums_2d(cx, cy, cz, nx, ny, nz, area, frame, medium)
-    elif sand[0] == 1.0:
-        fx, fy, fz, tx, ty, tz = kernels.sums_3d(cx, cy, cz, nx, ny, nz, area, frame, medium)
-    else:
-        fx, fy, fz, tx, ty, tz = kernels.sums_3d_quartic(cx, cy, cz, nx, ny, nz, area, frame, medium)
+    for first in range(0, area.size, BLOCK):
+        if block_is_clear(body, first // BLOCK, frame):
+            continue
+        last = min(first + BLOCK, area.size)
+        if sand[0] == 0.0:
+            f = kernels.sums_2d(cx, cy, cz, nx, ny, nz, area, first, last, frame, medium)
+        elif sand[0] == 1.0:
+            f = kernels.sums_3d(cx, cy, cz, nx, ny, nz, area, first, last, frame, medium)
+        else:
+            f = kernels.sums_3d_quartic(cx, cy, cz, nx, ny, nz, area, first, last, frame, medium)
+        fx, fy, fz, tx, ty, tz = fx + f[0], fy + f[1], fz + f[2], tx + f[3], ty + f[4], tz + f[5]
     return to_world(xmat, fx, fy, fz) + to_world(xmat, tx, ty, tz)
 
 
@@ -250,7 +281,7 @@ _fill_tractions = _make_tractions(SOURCE)
 
 def tractions(sand: Array, body: Array, xpos: Any, xmat: Any, velocity: Any, omega: Any) -> tuple[Array, Array]:
     """Each triangle's stress [Pa] in the body frame, (ntri, 3), and effective depth [m], (ntri,)."""
-    ntri = (body.size - HEADER) // COLUMNS
+    ntri = int(body[14])
     stress, depth = np.empty((ntri, 3)), np.empty(ntri)
     arguments = (np.ascontiguousarray(x, dtype=float) for x in (sand, body, xpos, xmat, velocity, omega))
     _fill_tractions(*arguments, stress, depth)

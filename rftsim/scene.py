@@ -18,7 +18,7 @@ from rftsim.errors import RftsimWarning, SceneError
 from rftsim.geometry import body_surface, geom_label, is_colliding
 from rftsim.laws import Law, get_law
 from rftsim.sand import FreeSurface, Sand, make_sand
-from rftsim.surface import Surface, Wheel
+from rftsim.surface import Array, Surface, Wheel
 
 _GEOM = mujoco.mjtGeom
 SAND_RGBA = (0.76, 0.70, 0.50, 0.55)
@@ -91,7 +91,8 @@ def add_sand(
     _name_bodies(spec)
     model = _compiled(spec)
     _check_options(model, bed_sand)
-    surfaces, reasons = _surfaces(model, bodies, geoms == "collision", max_edge, allow_open)
+    plane_normal = numbers[7:10] if bed_law.planar else None
+    surfaces, reasons = _surfaces(model, bodies, geoms == "collision", max_edge, allow_open, plane_normal)
     if bed_law.dynamic:
         surfaces |= _with_wheels(model, surfaces, wheels)
     notes = [note for one in surfaces.values() for note in one.notes]
@@ -175,7 +176,12 @@ def _check_options(model: mujoco.MjModel, sand: Sand) -> None:
 
 
 def _surfaces(
-    model: mujoco.MjModel, bodies: Iterable[str] | None, collision_only: bool, max_edge: float | None, allow_open: bool
+    model: mujoco.MjModel,
+    bodies: Iterable[str] | None,
+    collision_only: bool,
+    max_edge: float | None,
+    allow_open: bool,
+    plane: Array | None,
 ) -> tuple[dict[str, Surface], dict[str, str]]:
     names = [model.body(i).name for i in range(model.nbody)]
     chosen = None if bodies is None else set(bodies)
@@ -199,8 +205,8 @@ def _surfaces(
             if found is None:
                 reasons[name] = "has no geom that collides" if model.body_geomnum[i] else "has no geom"
             else:
-                surfaces[name] = found
-                reasons[name] = f"moves, {found.ntri} triangles"
+                felt, reasons[name] = _felt(model, i, found, plane)
+                surfaces[name] = felt.clustered(packed.BLOCK)
                 continue
         if chosen is not None:
             raise SceneError(f"body {name!r} cannot feel the sand: it {reasons[name]}")
@@ -211,6 +217,40 @@ def _surfaces(
             '<compiler discardvisual="true"/> deletes the others'
         )
     return surfaces, reasons
+
+
+def _felt(model: mujoco.MjModel, body: int, surface: Surface, plane: Array | None) -> tuple[Surface, str]:
+    """What of a surface can feel the sand, and why.
+
+    Under a planar law, faces parallel to the plane of motion carry nothing; where the body cannot turn out of that
+    plane they never will.
+    """
+    everything = f"moves, {surface.ntri} triangles"
+    if plane is None or not _stays_in_plane(model, body, plane):
+        return surface, everything
+    carries = np.abs(surface.normals @ plane) < 1.0 - 1e-6
+    if carries.all() or not carries.any():
+        return surface, everything
+    return (
+        dataclasses.replace(surface, triangles=surface.triangles[carries]),
+        f"moves in the plane; {np.count_nonzero(~carries)} of {surface.ntri} triangles are parallel to it and left out",
+    )
+
+
+def _stays_in_plane(model: mujoco.MjModel, body: int, plane: Array) -> bool:
+    """Whether every joint above a body is a slide or a hinge about the plane's normal, from an upright rest pose."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    if not np.allclose(data.xmat[body].reshape(3, 3) @ plane, plane, atol=1e-9):
+        return False
+    while body != 0:
+        for joint in range(model.body_jntadr[body], model.body_jntadr[body] + model.body_jntnum[body]):
+            kind = mujoco.mjtJoint(model.jnt_type[joint])
+            about = abs(data.xaxis[joint] @ plane) > 1.0 - 1e-9
+            if kind != mujoco.mjtJoint.mjJNT_SLIDE and not (kind == mujoco.mjtJoint.mjJNT_HINGE and about):
+                return False
+        body = model.body_parentid[body]
+    return True
 
 
 def _with_wheels(

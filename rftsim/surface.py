@@ -87,6 +87,20 @@ class Surface:
         """The surface after x -> rotation x + translation."""
         return dataclasses.replace(self, triangles=self.triangles @ np.asarray(rotation).T + np.asarray(translation))
 
+    def clustered(self, size: int) -> "Surface":
+        """The surface with its triangles in an order where each `size` of them lie close together."""
+        parts, order = [np.arange(self.ntri)], []
+        while parts:
+            part = parts.pop()
+            if len(part) <= size:
+                order.append(part)
+                continue
+            axis = int(np.argmax(np.ptp(self.centres[part], axis=0)))
+            part = part[np.argsort(self.centres[part, axis], kind="stable")]
+            middle = size * ((len(part) // 2 + size - 1) // size)
+            parts += [part[middle:], part[:middle]]
+        return dataclasses.replace(self, triangles=self.triangles[np.concatenate(order)])
+
     def refined(self, max_edge: float) -> "Surface":
         """The surface with its triangles split until no edge exceeds max_edge [m]."""
         if not max_edge > 0.0:
