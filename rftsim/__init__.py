@@ -3,7 +3,7 @@
 from rftsim.engine.plugin import register as _register
 from rftsim.errors import RftsimError, RftsimWarning, SandError, SceneError, SurfaceError
 from rftsim.laws import LAWS, Law
-from rftsim.readout import Instance, Tractions, Wrenches, instances, tractions, wrenches
+from rftsim.readout import Instance, Tractions, Work, Wrenches, instances, tractions, work, wrenches
 from rftsim.rigid import SurfaceForce, surface_force
 from rftsim.sand import PRESETS, FreeSurface, Sand, make_sand
 from rftsim.scene import Bed, add_sand, load

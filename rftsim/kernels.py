@@ -1,6 +1,6 @@
 """The force laws, compiled: stress on one triangle, and the sums over a body.
 
-Every law is one function from a triangle's outward normal, velocity and depth to the stress on it; `_sums` and
+Every law is one function from a triangle's outward normal and velocity to the stress on it per depth; `_sums` and
 `_tractions` make from it the compiled loops that everything else calls. No angle is formed: projections of the normal
 and the velocity suffice. All vectors are in the body frame, so that no triangle is rotated.
 
@@ -19,6 +19,9 @@ FASTMATH = {"reassoc", "contract", "arcp", "nsz"}
 """Floating-point liberties of the compiled loops."""
 
 TINY = 1e-300
+BLOCK = 64
+"""Triangles that are evaluated together."""
+STEP = 1e300
 
 _C3 = tables.columns(tables.TABLE_C3)
 _C4 = tables.columns(tables.TABLE_C4)
@@ -34,6 +37,8 @@ class Frame(NamedTuple):
     """Angular velocity [rad/s], (3,)."""
     up: Any
     """Normal of the free surface, (3,)."""
+    rise: Any
+    """Gradient of the height above the free surface, (3,): `up`, unless a sub-cycled step has turned it."""
     forward: Any
     """Horizontal axis of the plane of motion of the 2D laws, (3,)."""
     height: Any
@@ -55,6 +60,8 @@ class Medium(NamedTuple):
     """lambda rho_c of the inertial term [kg/m^3]; zero for the quasi-static laws."""
     edge_on: Any
     """Rounding of the normals [-]: n.v_hat down to minus this counts as leading, n.up up to this as facing down."""
+    ramp: Any
+    """Steepness with which the leading-edge rule falls off below that [-]; STEP for the rule as published."""
 
 
 @njit(forceinline=True)
@@ -82,12 +89,19 @@ def quartic(c, x1, x2, x3):
     )
 
 
+@njit(forceinline=True)
+def _leading(vn, speed2, medium):
+    """The leading-edge rule on n.v_hat: one or zero, over a ramp where the medium asks for one; zero at rest."""
+    share = min(max(1.0 + (vn + medium.edge_on) * medium.ramp, 0.0), 1.0)
+    return share if speed2 > 0.0 else 0.0
+
+
 def _stress_3d(fit: Any, c: Any) -> Any:
     c1, c2, c3 = c
 
     @njit(forceinline=True)
-    def stress(nx, ny, nz, vx, vy, vz, depth, frame, medium):
-        """Stress of 3D-RFT, [Agarwal] eqs. (5.5), (5.6), (5.9), with the inertial term of eq. (4.2)."""
+    def stress(nx, ny, nz, vx, vy, vz, frame, medium):
+        """Stress of 3D-RFT per depth, [Agarwal] eqs. (5.5), (5.6), (5.9), and the inertial stress of eq. (4.2)."""
         ux, uy, uz = frame.up
         speed2 = vx * vx + vy * vy + vz * vz
         inverse = 1.0 / np.sqrt(speed2 + TINY)
@@ -106,24 +120,27 @@ def _stress_3d(fit: Any, c: Any) -> Any:
         a2 = f1 * f1 + f2 * f2 + f3 * f3 + 2.0 * (f1 * f2 * x3 + f1 * f3 * x2 + f2 * f3 * x1)
         a_t = np.sqrt(max(a2 - a_n * a_n, TINY))
         slip = min(medium.mu_surf * abs(a_n) / a_t, 1.0)
-        leading = 1.0 if (vn >= -medium.edge_on) and (speed2 > 0.0) else 0.0
-        scale = leading * medium.xi * max(depth, 0.0)
-        submerged = leading if depth > 0.0 else 0.0
-        along_n = scale * (slip * (side * f1 - a_n) - abs(a_n)) - submerged * medium.lambda_rho * vn_ * vn_
+        leading = _leading(vn, speed2, medium)
+        scale = leading * medium.xi
+        along_n = scale * (slip * (side * f1 - a_n) - abs(a_n))
         along_v = scale * slip * f2 * inverse
         along_u = -scale * slip * f3
+        inertia = -leading * medium.lambda_rho * vn_ * max(vn_, 0.0)
         return (
             along_n * nx + along_v * vx + along_u * ux,
             along_n * ny + along_v * vy + along_u * uy,
             along_n * nz + along_v * vz + along_u * uz,
+            inertia * nx,
+            inertia * ny,
+            inertia * nz,
         )
 
     return stress
 
 
 @njit(forceinline=True)
-def _stress_2d(nx, ny, nz, vx, vy, vz, depth, frame, medium):
-    """Stress of 2D-RFT, [Agarwal] eqs. (3.1) to (3.4), with the inertial term of eq. (4.2).
+def _stress_2d(nx, ny, nz, vx, vy, vz, frame, medium):
+    """Stress of 2D-RFT per depth, [Agarwal] eqs. (3.1) to (3.4), and the inertial stress of eq. (4.2).
 
     Per unit of the triangle's whole area: the projection of its area vector onto the plane of motion is taken here.
     Unlike [Agarwal], the horizontal response opposes the motion: with the printed sign it would add energy.
@@ -156,22 +173,37 @@ def _stress_2d(nx, ny, nz, vx, vy, vz, depth, frame, medium):
     alpha_z = a00 + a10 * cos_2beta + b01 * sin_gamma + b11 * (sc + cs) + bm11 * (cs - sc)
     alpha_x = c01 * cos_gamma + c11 * (cc - ss) + cm11 * (cc + ss) + d10 * sin_2beta
     vn_ = px * wx + pz * wz
-    leading = projected if (vn_ * inverse >= -medium.edge_on) and (speed2 > 0.0) else 0.0
-    scale = leading * medium.xi * max(depth, 0.0)
-    submerged = leading if depth > 0.0 else 0.0
-    inertia = submerged * medium.lambda_rho * vn_ * vn_
-    along_e = -scale * mirror * alpha_x - inertia * px
-    along_u = scale * alpha_z - inertia * pz
-    return along_e * ex + along_u * ux, along_e * ey + along_u * uy, along_e * ez + along_u * uz
+    leading = projected * _leading(vn_ * inverse, speed2, medium)
+    scale = leading * medium.xi
+    along_e = -scale * mirror * alpha_x
+    along_u = scale * alpha_z
+    inertia = -leading * medium.lambda_rho * vn_ * max(vn_, 0.0)
+    return (
+        along_e * ex + along_u * ux,
+        along_e * ey + along_u * uy,
+        along_e * ez + along_u * uz,
+        inertia * (px * ex + pz * ux),
+        inertia * (px * ey + pz * uy),
+        inertia * (px * ez + pz * uz),
+    )
 
 
 @njit(forceinline=True)
 def _depth(x, y, z, frame):
     """Effective depth of a point below the free surface, [Agarwal] eq. (4.2)."""
-    ux, uy, uz = frame.up
+    ux, uy, uz = frame.rise
     rx, ry, rz, r0 = frame.rear
     drop = frame.drop if rx * x + ry * y + rz * z + r0 < 0.0 else 0.0
     return frame.height - (ux * x + uy * y + uz * z) - drop
+
+
+@njit(fastmath=FASTMATH, error_model="numpy", forceinline=True)
+def deepest(cx, cy, cz, first, last, frame):
+    """Largest depth of triangles first to last [m]."""
+    found = -1e30
+    for i in range(first, last):
+        found = max(found, _depth(cx[i], cy[i], cz[i], frame))
+    return found
 
 
 def _sums(stress: Any) -> Any:
@@ -183,18 +215,19 @@ def _sums(stress: Any) -> Any:
         fx = fy = fz = tx = ty = tz = 0.0
         for i in range(first, last):
             x, y, z = cx[i], cy[i], cz[i]
-            sx, sy, sz = stress(
+            sx, sy, sz, ix, iy, iz = stress(
                 nx[i],
                 ny[i],
                 nz[i],
                 v0x + wy * z - wz * y,
                 v0y + wz * x - wx * z,
                 v0z + wx * y - wy * x,
-                _depth(x, y, z, frame),
                 frame,
                 medium,
             )
-            gx, gy, gz = area[i] * sx, area[i] * sy, area[i] * sz
+            depth = _depth(x, y, z, frame)
+            weight, sunk = area[i] * max(depth, 0.0), area[i] if depth > 0.0 else 0.0
+            gx, gy, gz = weight * sx + sunk * ix, weight * sy + sunk * iy, weight * sz + sunk * iz
             fx += gx
             fy += gy
             fz += gz
@@ -217,13 +250,156 @@ def _tractions(stress: Any) -> Any:
             vx = v0x + wy * z - wz * y
             vy = v0y + wz * x - wx * z
             vz = v0z + wx * y - wy * x
-            depth_out[i] = _depth(x, y, z, frame)
-            sx, sy, sz = stress(nx[i], ny[i], nz[i], vx, vy, vz, depth_out[i], frame, medium)
-            stress_out[i, 0] = sx
-            stress_out[i, 1] = sy
-            stress_out[i, 2] = sz
+            depth = _depth(x, y, z, frame)
+            sx, sy, sz, ix, iy, iz = stress(nx[i], ny[i], nz[i], vx, vy, vz, frame, medium)
+            sunk = 1.0 if depth > 0.0 else 0.0
+            depth_out[i] = depth
+            depth = max(depth, 0.0)
+            stress_out[i, 0] = depth * sx + sunk * ix
+            stress_out[i, 1] = depth * sy + sunk * iy
+            stress_out[i, 2] = depth * sz + sunk * iz
 
     return tractions
+
+
+def _sums_ahead(stress: Any) -> Any:
+    @njit(fastmath=FASTMATH, error_model="numpy", forceinline=True)
+    def sums_ahead(cx, cy, cz, nx, ny, nz, area, first, last, frame, medium, v_c, h):
+        """The sums of a law made continuous at rest, now and at the depths after a time h of this motion.
+
+        The stress per depth is scaled by |v| / sqrt(|v|^2 + v_c^2): the force of a law that knows only the direction
+        of motion falls to zero at rest.
+
+        Returns:
+            Force and moment at the present depths, and force and moment at the later ones.
+        """
+        v0x, v0y, v0z = frame.v0
+        wx, wy, wz = frame.omega
+        ux, uy, uz = frame.rise
+        fx = fy = fz = tx = ty = tz = 0.0
+        fx1 = fy1 = fz1 = tx1 = ty1 = tz1 = 0.0
+        for i in range(first, last):
+            x, y, z = cx[i], cy[i], cz[i]
+            vx = v0x + wy * z - wz * y
+            vy = v0y + wz * x - wx * z
+            vz = v0z + wx * y - wy * x
+            speed2 = vx * vx + vy * vy + vz * vz
+            slow = np.sqrt(speed2 / (speed2 + v_c * v_c + TINY))
+            sx, sy, sz, ix, iy, iz = stress(nx[i], ny[i], nz[i], vx, vy, vz, frame, medium)
+            depth = _depth(x, y, z, frame)
+            later = depth - h * (vx * ux + vy * uy + vz * uz)
+            weight, sunk = slow * area[i] * max(depth, 0.0), area[i] if depth > 0.0 else 0.0
+            gx, gy, gz = weight * sx + sunk * ix, weight * sy + sunk * iy, weight * sz + sunk * iz
+            fx += gx
+            fy += gy
+            fz += gz
+            tx += y * gz - z * gy
+            ty += z * gx - x * gz
+            tz += x * gy - y * gx
+            weight, sunk = slow * area[i] * max(later, 0.0), area[i] if later > 0.0 else 0.0
+            gx, gy, gz = weight * sx + sunk * ix, weight * sy + sunk * iy, weight * sz + sunk * iz
+            fx1 += gx
+            fy1 += gy
+            fz1 += gz
+            tx1 += y * gz - z * gy
+            ty1 += z * gx - x * gz
+            tz1 += x * gy - y * gx
+        return fx, fy, fz, tx, ty, tz, fx1, fy1, fz1, tx1, ty1, tz1
+
+    return sums_ahead
+
+
+STEP_ASIDE = 1e-7
+"""Turn of the direction of motion [rad] by which the laws are differentiated."""
+
+
+def _jacobians(stress: Any) -> Any:
+    @njit(fastmath=FASTMATH, error_model="numpy", forceinline=True)
+    def stiffness(cx, cy, cz, nx, ny, nz, area, first, last, frame, medium, v_c, completed, k):
+        """Derivative of each triangle's force by its velocity: nine runs of BLOCK in k.
+
+        One array, and at most BLOCK triangles: LLVM gives up on telling more arrays apart.
+        """
+        v0x, v0y, v0z = frame.v0
+        wx, wy, wz = frame.omega
+        for i in range(last - first):
+            t = first + i
+            x, y, z = cx[t], cy[t], cz[t]
+            n0, n1, n2 = nx[t], ny[t], nz[t]
+            vx = v0x + wy * z - wz * y
+            vy = v0y + wz * x - wx * z
+            vz = v0z + wx * y - wy * x
+            speed2 = vx * vx + vy * vy + vz * vz
+            inverse = 1.0 / np.sqrt(speed2 + TINY)
+            a, b, c = vx * inverse, vy * inverse, vz * inverse
+            sign = 1.0 if c >= 0.0 else -1.0  # two directions across the motion, without a branch
+            turn = -1.0 / (sign + c)
+            p0, p1, p2 = 1.0 + sign * a * a * turn, sign * a * b * turn, -sign * a
+            q0, q1, q2 = a * b * turn, sign + b * b * turn, -b
+            d = STEP_ASIDE
+            s0, s1, s2, i0, i1, i2 = stress(n0, n1, n2, vx, vy, vz, frame, medium)
+            e0, e1, e2, _, _, _ = stress(n0, n1, n2, a + d * p0, b + d * p1, c + d * p2, frame, medium)
+            f0, f1, f2, _, _, _ = stress(n0, n1, n2, a + d * q0, b + d * q1, c + d * q2, frame, medium)
+            depth = _depth(x, y, z, frame)
+            radius = 1.0 / np.sqrt(speed2 + v_c * v_c + TINY)
+            weight = area[t] * max(depth, 0.0) * radius if speed2 > 0.0 else 0.0
+            along = weight * (completed + (1.0 - completed) * v_c * v_c * radius * radius)
+            across = weight / d
+            brake = (2.0 * area[t] if depth > 0.0 else 0.0) / min(vx * i0 + vy * i1 + vz * i2, -TINY)
+            e0, e1, e2 = across * (e0 - s0), across * (e1 - s1), across * (e2 - s2)
+            f0, f1, f2 = across * (f0 - s0), across * (f1 - s1), across * (f2 - s2)
+            k[i] = e0 * p0 + f0 * q0 + along * s0 * a + brake * i0 * i0
+            k[i + 1 * BLOCK] = e0 * p1 + f0 * q1 + along * s0 * b + brake * i0 * i1
+            k[i + 2 * BLOCK] = e0 * p2 + f0 * q2 + along * s0 * c + brake * i0 * i2
+            k[i + 3 * BLOCK] = e1 * p0 + f1 * q0 + along * s1 * a + brake * i1 * i0
+            k[i + 4 * BLOCK] = e1 * p1 + f1 * q1 + along * s1 * b + brake * i1 * i1
+            k[i + 5 * BLOCK] = e1 * p2 + f1 * q2 + along * s1 * c + brake * i1 * i2
+            k[i + 6 * BLOCK] = e2 * p0 + f2 * q0 + along * s2 * a + brake * i2 * i0
+            k[i + 7 * BLOCK] = e2 * p1 + f2 * q1 + along * s2 * b + brake * i2 * i1
+            k[i + 8 * BLOCK] = e2 * p2 + f2 * q2 + along * s2 * c + brake * i2 * i2
+
+    @njit(fastmath=FASTMATH, error_model="numpy", forceinline=True)
+    def jacobian(cx, cy, cz, nx, ny, nz, area, first, last, frame, medium, v_c, completed, scratch, out):
+        """Add the derivative of `sums_ahead`'s force and moment by the body's twist to out, (6, 6).
+
+        A law depends on the direction of motion alone but for the scale at rest and the inertial term, so two
+        differences across the motion and those two closed forms give all of it. `completed` (0 or 1) replaces the
+        scale's derivative v_c^2 / r^3 by 1 / r, r^2 = |v|^2 + v_c^2: tangent across the motion and secant along it.
+        At most BLOCK triangles; `scratch` is (9 * BLOCK,).
+        """
+        stiffness(cx, cy, cz, nx, ny, nz, area, first, last, frame, medium, v_c, completed, scratch)
+        for row in range(3):
+            start = 3 * row * BLOCK
+            a = scratch[start : start + BLOCK]
+            b = scratch[start + BLOCK : start + 2 * BLOCK]
+            c = scratch[start + 2 * BLOCK : start + 3 * BLOCK]
+            _add_rows(cx, cy, cz, first, last, a, b, c, row, out)
+
+    return jacobian
+
+
+@njit(fastmath=FASTMATH, error_model="numpy", forceinline=True)
+def _add_rows(cx, cy, cz, first, last, a, b, c, row, out):
+    """Add the share of one component of the triangles' forces, whose derivatives are (a, b, c), to out, (6, 6)."""
+    f0 = f1 = f2 = f3 = f4 = f5 = 0.0
+    x0 = x1 = x2 = x3 = x4 = x5 = 0.0
+    y0 = y1 = y2 = y3 = y4 = y5 = 0.0
+    z0 = z1 = z2 = z3 = z4 = z5 = 0.0
+    for i in range(last - first):
+        x, y, z = cx[first + i], cy[first + i], cz[first + i]
+        u, v, w = a[i], b[i], c[i]
+        p, q, r = w * y - v * z, u * z - w * x, v * x - u * y  # by the angular velocity: velocity is omega x r
+        f0, f1, f2, f3, f4, f5 = f0 + u, f1 + v, f2 + w, f3 + p, f4 + q, f5 + r
+        x0, x1, x2, x3, x4, x5 = x0 + x * u, x1 + x * v, x2 + x * w, x3 + x * p, x4 + x * q, x5 + x * r
+        y0, y1, y2, y3, y4, y5 = y0 + y * u, y1 + y * v, y2 + y * w, y3 + y * p, y4 + y * q, y5 + y * r
+        z0, z1, z2, z3, z4, z5 = z0 + z * u, z1 + z * v, z2 + z * w, z3 + z * p, z4 + z * q, z5 + z * r
+    force = (f0, f1, f2, f3, f4, f5)
+    arms = ((x0, x1, x2, x3, x4, x5), (y0, y1, y2, y3, y4, y5), (z0, z1, z2, z3, z4, z5))
+    after, before = (row + 1) % 3, (row + 2) % 3
+    for k in range(6):
+        out[row, k] += force[k]
+        out[3 + after, k] += arms[before][k]
+        out[3 + before, k] -= arms[after][k]
 
 
 _stress_3d_cubic = _stress_3d(cubic, _C3)
@@ -232,3 +408,7 @@ _stress_3d_quartic = _stress_3d(quartic, _C4)
 sums_2d, tractions_2d = _sums(_stress_2d), _tractions(_stress_2d)
 sums_3d, tractions_3d = _sums(_stress_3d_cubic), _tractions(_stress_3d_cubic)
 sums_3d_quartic, tractions_3d_quartic = _sums(_stress_3d_quartic), _tractions(_stress_3d_quartic)
+
+ahead_2d, jacobian_2d = _sums_ahead(_stress_2d), _jacobians(_stress_2d)
+ahead_3d, jacobian_3d = _sums_ahead(_stress_3d_cubic), _jacobians(_stress_3d_cubic)
+ahead_3d_quartic, jacobian_3d_quartic = _sums_ahead(_stress_3d_quartic), _jacobians(_stress_3d_quartic)

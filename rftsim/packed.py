@@ -19,7 +19,7 @@ from rftsim.surface import Array, Surface
 
 SAND_FIELDS: Final = (
     *("law", "planar", "dynamic", "up_x", "up_y", "up_z", "offset", "plane_x", "plane_y", "plane_z"),
-    *("xi_n", "zeta", "mu_surf", "rho_c", "lambda_", "g"),
+    *("xi_n", "zeta", "mu_surf", "rho_c", "lambda_", "g", "implicit"),
 )
 """Entries of a packed sand, in order."""
 
@@ -27,16 +27,17 @@ HEADER: Final = 16
 """Numbers before the triangles of a packed surface.
 
 0 leading-edge tolerance; 1-3 and 4-6 lowest and highest corner; 7-9 wheel axis, 10-12 wheel centre, 13 wheel radius
-(zero where the body is no wheel); 14 number of triangles; 15 unused.
+(zero where the body is no wheel); 14 number of triangles; 15 their root-mean-square
+distance from the origin.
 """
 COLUMNS: Final = 7
 """Numbers per triangle, each a column: centre (3), normal (3), area."""
-BLOCK: Final = 64
+BLOCK: Final = kernels.BLOCK
 """Triangles that are passed over together where their bounding sphere lies above the sand; the spheres (centre, radius)
 stand behind the columns."""
 
 
-def pack_sand(sand: Sand, law: Law, free_surface: FreeSurface, plane: ArrayLike) -> Array:
+def pack_sand(sand: Sand, law: Law, free_surface: FreeSurface, plane: ArrayLike, implicit: bool = False) -> Array:
     """A sand bed as numbers, in the order of SAND_FIELDS.
 
     Raises:
@@ -46,11 +47,11 @@ def pack_sand(sand: Sand, law: Law, free_surface: FreeSurface, plane: ArrayLike)
     up = np.array(free_surface.normal)
     normal = np.asarray(plane, dtype=float)
     length = np.linalg.norm(normal)
-    if normal.shape != (3,) or not length > 0.0 or abs(normal @ up) > 1e-6 * length:
+    if normal.shape != (3,) or not length > 0.0 or (law.planar and abs(normal @ up) > 1e-6 * length):
         raise ValueError(f"the normal of the plane of motion must be horizontal, as (0, 1, 0) is, not {plane!r}")
     rho_c = sand.density() if law.dynamic else (sand.rho_c or 0.0)
     flags = (law.code, law.planar, law.dynamic)
-    strength = (sand.xi_n, sand.zeta, sand.mu_surf, rho_c, sand.lambda_, sand.g)
+    strength = (sand.xi_n, sand.zeta, sand.mu_surf, rho_c, sand.lambda_, sand.g, implicit)
     return np.array([*flags, *up, free_surface.offset, *(normal / length), *strength], dtype=float)
 
 
@@ -63,6 +64,7 @@ def pack_surface(surface: Surface) -> Array:
     if surface.wheel is not None:
         header[7:10], header[10:13], header[13] = surface.wheel.axis, surface.wheel.centre, surface.wheel.radius
     header[14] = surface.ntri
+    header[15] = np.sqrt((surface.centres**2).sum(axis=1).mean())
     return np.concatenate([header, *surface.centres.T, *surface.normals.T, surface.areas, _spheres(surface).ravel()])
 
 
@@ -74,9 +76,15 @@ def _spheres(surface: Surface) -> Array:
     return np.column_stack([centres, radii])
 
 
+def read_columns(body: Array) -> tuple[Array, ...]:
+    """The columns of a packed surface: centre (3), normal (3), area; views, each (ntri,)."""
+    n = int(body[14])
+    return tuple(body[HEADER + k * n : HEADER + (k + 1) * n] for k in range(COLUMNS))
+
+
 @njit(forceinline=True)
 def columns(body):
-    """The columns of a packed surface: centre (3), normal (3), area; each (ntri,)."""
+    """The same for compiled code."""
     n = int(body[14])
     start = HEADER
     return (
@@ -91,11 +99,11 @@ def columns(body):
 
 
 @njit(forceinline=True)
-def block_is_clear(body, block, frame):
-    """Whether a block of triangles lies wholly above the undisturbed sand."""
+def block_is_clear(body, block, frame, margin):
+    """Whether a block of triangles lies more than a margin above the undisturbed sand."""
     start = HEADER + COLUMNS * int(body[14]) + 4 * block
-    height = frame.up[0] * body[start] + frame.up[1] * body[start + 1] + frame.up[2] * body[start + 2]
-    return height - body[start + 3] >= frame.height
+    height = frame.rise[0] * body[start] + frame.rise[1] * body[start + 1] + frame.rise[2] * body[start + 2]
+    return height - body[start + 3] >= frame.height + margin
 
 
 @njit(forceinline=True)
@@ -143,7 +151,7 @@ def medium_of(sand, body):
     """The medium of a packed sand as its law sees it."""
     xi = sand[11] if sand[1] != 0.0 else sand[10]
     lambda_rho = sand[14] * sand[13] if sand[2] != 0.0 else 0.0
-    return Medium(xi, sand[12], lambda_rho, body[0])
+    return Medium(xi, sand[12], lambda_rho, body[0], kernels.STEP)
 
 
 @njit(forceinline=True)
@@ -154,11 +162,11 @@ def frame_of(sand, body, xpos, xmat, velocity, omega):
     up = to_body(xmat, sand[3], sand[4], sand[5])
     plane = to_body(xmat, sand[7], sand[8], sand[9])
     height = sand[6] - (sand[3] * xpos[0] + sand[4] * xpos[1] + sand[5] * xpos[2])
-    frame = Frame(v0, w, up, _cross(plane, up), height, (0.0, 0.0, 0.0, 0.0), 0.0)
+    frame = Frame(v0, w, up, up, _cross(plane, up), height, (0.0, 0.0, 0.0, 0.0), 0.0)
     if sand[2] == 0.0 or body[13] == 0.0:
         return frame
     rear, drop = _structural(sand, body, frame, plane)
-    return Frame(v0, w, up, frame.forward, height, rear, drop)
+    return Frame(v0, w, up, up, frame.forward, height, rear, drop)
 
 
 @njit(forceinline=True)
@@ -189,7 +197,7 @@ def _structural(sand, body, frame, plane):
     planar = sand[1]
     for i in range(area.size):
         if i % BLOCK == 0:
-            clear = block_is_clear(body, i // BLOCK, frame)
+            clear = block_is_clear(body, i // BLOCK, frame, 0.0)
         if clear:
             continue
         x, y, z = cx[i], cy[i], cz[i]
@@ -245,7 +253,7 @@ def packed_wrench(sand, body, xpos, xmat, velocity, omega):
     fx = fy = fz = tx = ty = tz = 0.0
     cx, cy, cz, nx, ny, nz, area = columns(body)
     for first in range(0, area.size, BLOCK):
-        if block_is_clear(body, first // BLOCK, frame):
+        if block_is_clear(body, first // BLOCK, frame, 0.0):
             continue
         last = min(first + BLOCK, area.size)
         if sand[0] == 0.0:

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from rftsim import packed
-from rftsim.engine import plugin
+from rftsim.engine.instance import BODY_MARKER, SAND_MARKER, read_counters, read_wrenches
 from rftsim.errors import SceneError
 from rftsim.surface import Array
 
@@ -56,13 +56,13 @@ def instances(model: mujoco.MjModel) -> list[Instance]:
     by_name = {model.numeric(i).name: i for i in range(model.nnumeric)}
     found: dict[int, dict[int, Array]] = {}
     for body in np.flatnonzero(model.body_plugin >= 0):
-        numeric = _marked(by_name, plugin.BODY_MARKER, model.body(int(body)).name)
+        numeric = _marked(by_name, BODY_MARKER, model.body(int(body)).name)
         if numeric is not None:
             found.setdefault(int(model.body_plugin[body]), {})[int(body)] = _numeric(model, numeric)
     beds = []
     for instance, bodies in found.items():
         name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_PLUGIN, instance)
-        numeric = _marked(by_name, plugin.SAND_MARKER, name)
+        numeric = _marked(by_name, SAND_MARKER, name)
         assert numeric is not None, "MuJoCo would not have made data for a bed without its sand"
         beds.append(Instance(instance, name, _numeric(model, numeric), bodies))
     return beds
@@ -86,7 +86,7 @@ def wrenches(model: mujoco.MjModel, data: mujoco.MjData) -> Wrenches:
     """Force and moment of the sand on each body, as applied in the last mj_forward or mj_step of `data`."""
     force, moment = np.zeros((model.nbody, 3)), np.zeros((model.nbody, 3))
     for bed in instances(model):
-        for body, wrench in plugin.stored_wrenches(int(data.plugin_data[bed.id])):
+        for body, wrench in read_wrenches(int(data.plugin_data[bed.id])):
             force[body], moment[body] = wrench[:3], wrench[3:]
     velocity, omega = body_velocities(model, data)
     return Wrenches(force, moment, np.einsum("ij,ij->i", force, velocity) + np.einsum("ij,ij->i", moment, omega))
@@ -110,7 +110,7 @@ def tractions(model: mujoco.MjModel, data: mujoco.MjData, body: "int | str") -> 
     stress, depth = packed.tractions(
         bed.sand, surface, data.xpos[index], data.xmat[index], velocity[index], omega[index]
     )
-    *columns, area = packed.columns.py_func(surface)
+    *columns, area = packed.read_columns(surface)
     centre, normal = np.array(columns[:3]).T, np.array(columns[3:]).T
     return Tractions(
         centre=centre @ rotation.T + data.xpos[index],
@@ -127,3 +127,24 @@ def body_velocities(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[Array, 
     omega = data.cvel[:, :3]  # MuJoCo's cvel: angular first
     arm = data.xpos - data.subtree_com[model.body_rootid]
     return data.cvel[:, 3:] + np.cross(omega, arm), omega
+
+
+class Work(NamedTuple):
+    """What the implicit force has cost since the data was made or reset."""
+
+    steps: int
+    evaluations: int
+    """Evaluations of every body's force."""
+    jacobians: int
+    """Evaluations of its derivative, each worth about four of the force."""
+    unsolved: int
+    """Equations whose solution stayed outside the tolerance; the best found was taken."""
+
+
+def work(model: mujoco.MjModel, data: mujoco.MjData) -> Work:
+    """The cost of the sand so far, summed over the beds."""
+    totals = np.zeros(4, dtype=int)
+    for bed in instances(model):
+        totals += np.array(read_counters(int(data.plugin_data[bed.id])), dtype=int)
+    steps, *costs = totals.tolist()
+    return Work(steps, *costs)

@@ -5,7 +5,7 @@ import os
 import types
 import uuid
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final, NamedTuple, Self
 
@@ -20,38 +20,36 @@ from scipy.spatial import cKDTree
 from rftsim import packed
 from rftsim.errors import RftsimError, SceneError
 from rftsim.geometry import body_surface, geom_triangles, is_colliding
-from rftsim.readout import Instance, instances, tractions, wrenches
+from rftsim.readout import Instance, body_velocities, instances, tractions, wrenches
 from rftsim.surface import Array
 
-BLOCK: Final = 64
-"""Frames that are gathered before they are written together."""
 OWN_PATHS: Final = ("world", "sand", "speed", "about")
 """First elements of the paths that the recorder itself writes."""
 INACTIVE: Final = (150, 150, 150)
 STOPS: Final = ((252, 197, 192), (250, 159, 181), (247, 104, 161), (197, 27, 138), (122, 1, 119))
 """Traction from none to the strongest, evenly spaced, ever darker: ColorBrewer's RdPu."""
-SAND: Final = (0.76, 0.70, 0.50, 0.3)
+SAND: Final = (0.76, 0.70, 0.50, 0.2)
 GRID_CELLS: Final = 16
 """Along each side of the drawn sand."""
-ABOUT: Final = """
-**Arrows**: the sand's force, {extent:.3g} m long per `sand/scale/force`: the largest so far, at first the weight,
-{scale.force:.3g} N. **Colours**: traction, light to dark up to `sand/scale/traction`: the largest so far, at first the
-weight over the area, {scale.traction:.3g} Pa; grey where the sand does not act. **Grid**: {cell:g} m.
-"""
+_BLOCK: Final = 64
+"""Frames per chunk of the file."""
+
+Channel = tuple[str, Any, dict[str, NDArray[Any]]]
+"""Entity, Rerun archetype, and its fields in all frames, (nframe, ...)."""
 
 
 class Recorder:
-    """Writes one MuJoCo simulation to a Rerun file.
+    """Records one MuJoCo simulation for the Rerun viewer.
 
     Under `world`: the geoms (not planes and height fields, which have no end), the surfaces that feel the sand coloured
-    by traction, an arrow of the sand's force on each body, and the sand's surface, which follows the bodies in whole
-    cells of its grid. Under `sand`: force [N], moment about the body's origin [N m] and depth of the deepest
-    triangle [m] of each body, total power [W], and the scales of arrows and colours. Under `speed`: that of each root
-    body [m/s]. All are those of the last mj_forward or mj_step of the data.
+    by traction, an arrow of the sand's force from each body's origin, and the sand's surface, which follows the bodies
+    in whole cells of its grid. Under `sand`: force [N], moment about the body's origin [N m] and depth of the deepest
+    triangle [m] of each body, and the total power [W]. Under `speed`: that of each root body [m/s]. All are those of
+    the last mj_forward or mj_step of the data. `about` states the scales, which are those of the whole recording.
 
-    The file appears at `close`, after it was read back and found complete. An exception inside the with-block closes
-    the recording too: its frames show what went wrong. When a reset turns time back, the recording goes on one period
-    after its last frame.
+    Frames stay in memory, some 4 bytes per triangle each, until `close` writes the file. An exception inside the
+    with-block does so too: the frames before it show what went wrong. When a reset turns time back, the recording goes
+    on one period after its last frame.
 
     Args:
         model: A compiled model, with or without sand.
@@ -72,16 +70,18 @@ class Recorder:
     ) -> None:
         if not 0.0 < fps < math.inf:
             raise RftsimError(f"fps must be positive and finite, not {fps:g}")
-        self.path, self.frames = Path(path).resolve(), 0
-        self._model, self._period, self._last, self._shift = model, 1.0 / fps, -math.inf, 0.0
-        self._beds = instances(model)
-        self._skins = [_make_skin(model, body, surface) for bed in self._beds for body, surface in bed.bodies.items()]
-        self._centre, self._extent = _initial_bounds(model)
-        self._cell = _round_number(self._extent / 3.0)
-        self._scale = _first_scale(model, self._beds)
-        self._file = _File(self.path, application_id)
-        self._log_static()
-        self._open_channels()
+        self.path = Path(path).resolve()
+        _check_writable(self.path)
+        self._application_id, self._period, self._shift = application_id, 1.0 / fps, 0.0
+        self._scene = _describe(model)
+        self._frames: list[_Frame] = []
+        self._scalars: dict[str, list[tuple[float, float]]] = {}
+        self._closed = False
+
+    @property
+    def frames(self) -> int:
+        """How many frames were recorded."""
+        return len(self._frames)
 
     def log(self, data: mujoco.MjData, scalars: Mapping[str, float] | None = None) -> bool:
         """Record a frame, unless the last one is less than a period ago.
@@ -96,30 +96,35 @@ class Recorder:
         Raises:
             RftsimError: The recorder is closed, or a scalar's path is one of its own.
         """
-        if self._file.closed:
+        if self._closed:
             raise RftsimError(f"the recorder of {self.path} is closed")
-        time = data.time + self._shift
-        if time < self._last:
-            self._shift = self._last + self._period - data.time
-            time = data.time + self._shift
-        elif time - self._last < self._period * (1.0 - 1e-6):  # sums of time steps are not exact
+        time, last = data.time + self._shift, self._frames[-1].time if self._frames else -math.inf
+        if time < last:
+            self._shift = last + self._period - data.time
+            time = last + self._period
+        elif time - last < self._period * (1.0 - 1e-6):  # sums of time steps are not exact
             return False
         extra = {_scalar_entity(path): float(value) for path, value in (scalars or {}).items()}
-        self._fill(data, self._file.pending)
-        self._file.end_frame(time, extra)
-        self._last = time
-        self.frames += 1
+        self._frames.append(_sample(self._scene, data, time))
+        for entity, value in extra.items():
+            self._scalars.setdefault(entity, []).append((time, value))
         return True
 
     def close(self) -> None:
-        """Finish the file, read it back and put it in place; does nothing a second time.
+        """Write the file beside its place, read it back and put it there; does nothing a second time.
 
         Raises:
             RftsimError: Frames are missing from the file, as on a full disk; what was at the path is left as it was.
         """
-        if not self._file.closed:
-            follow = _entity("world", "body", _name(self._model, self._roots[0])) if self._roots else None
-            self._file.close(_blueprint(self._centre, self._extent, follow, bool(self._felt), self._file.scalars))
+        if self._closed:
+            return
+        self._closed = True
+        stream = rr.RecordingStream(self._application_id, recording_id=uuid.uuid4())
+        memory = stream.memory_recording()  # unlike save, which on a full disk goes on, or waits for ever
+        stream.send_recording_name(self.path.stem)
+        stream.send_blueprint(_blueprint(self._scene, self._scalars))
+        rows = _send(stream, self._scene, self._frames, self._scalars)
+        _put(memory.drain_as_bytes(), rows, self.path)
 
     def __enter__(self) -> Self:
         return self
@@ -129,90 +134,277 @@ class Recorder:
     ) -> None:
         self.close()
 
-    def _log_static(self) -> None:
-        model, log = self._model, self._file.log_static
-        about = ABOUT.format(extent=self._extent, scale=self._scale, cell=self._cell)
-        log("/about", rr.TextDocument(about, media_type="text/markdown"))
-        log("/world", rr.ViewCoordinates.RIGHT_HAND_Z_UP)
-        for bed in self._beds:
-            log(_entity("world", "sand", bed.name), *_sand_shape(bed.sand, self._cell))
-        for skin in self._skins:
-            name = _name(model, skin.body)
-            log(_entity("world", "body", name, "skin"), _mesh(skin.triangles))
-            log(_entity("world", "force", name), rr.Arrows3D.from_fields(radii=0.01 * self._extent, colors=0x2878FFFF))
-            for quantity in ("force", "moment"):
-                log(_entity("sand", quantity, name), rr.SeriesLines(names=[f"{name} {axis}" for axis in "xyz"]))
-        skinned, felt = {geom for skin in self._skins for geom in skin.geoms}, {skin.body for skin in self._skins}
-        for geom in range(model.ngeom):
-            body = int(model.geom_bodyid[geom])
-            mesh = None if geom in skinned else _geom_mesh(model, geom, opacity=0.3 if body in felt else 1.0)
-            if mesh is not None:
-                log(_entity("world", "body", _name(model, body), model.geom(geom).name or f"geom{geom}"), mesh)
 
-    def _open_channels(self) -> None:
-        """Room for a block of frames of all that changes, and what shows which part of it."""
-        model, show, nfelt = self._model, self._file.show, len(self._skins)
-        self._felt = [skin.body for skin in self._skins]
-        self._roots = np.unique(model.body_rootid[self._felt or slice(1, None)]).tolist()
-        self._position, self._quaternion = np.empty((BLOCK, model.nbody, 3)), np.empty((BLOCK, model.nbody, 4))
-        self._speed, self._power, self._scales = (
-            np.empty((BLOCK, len(self._roots))),
-            np.empty(BLOCK),
-            np.empty((BLOCK, 2)),
-        )
-        self._ground, self._depth = np.empty((BLOCK, len(self._beds), 3)), np.empty((BLOCK, nfelt))
-        self._force, self._moment, self._arrows = np.empty((3, BLOCK, nfelt, 3))
-        self._colours = [np.empty((BLOCK, len(skin.nearest), 3), dtype=np.uint32) for skin in self._skins]
-        for i in range(1, model.nbody):
-            pose = {"translation": self._position[:, i], "quaternion": self._quaternion[:, i]}
-            show(_entity("world", "body", _name(model, i)), rr.Transform3D, **pose)
-        for i, root in enumerate(self._roots):
-            show(_entity("speed", _name(model, root)), rr.Scalars, scalars=self._speed[:, i])
-        for i, bed in enumerate(self._beds):
-            show(_entity("world", "sand", bed.name), rr.Transform3D, translation=self._ground[:, i])
-        for i, body in enumerate(self._felt):
-            name = _name(model, body)
-            for quantity, values in ("force", self._force), ("moment", self._moment), ("depth", self._depth):
-                show(_entity("sand", quantity, name), rr.Scalars, scalars=values[:, i])
-            show(
-                _entity("world", "force", name),
-                rr.Arrows3D,
-                origins=self._position[:, body],
-                vectors=self._arrows[:, i],
-            )
-            show(_entity("world", "body", name, "skin"), rr.Mesh3D, vertex_colors=self._colours[i])
-        if nfelt:
-            show("/sand/power", rr.Scalars, scalars=self._power)
-            show("/sand/scale/force", rr.Scalars, scalars=self._scales[:, 0])
-            show("/sand/scale/traction", rr.Scalars, scalars=self._scales[:, 1])
+class _Scene(NamedTuple):
+    """What a recording needs of a model."""
 
-    def _fill(self, data: mujoco.MjData, k: int) -> None:
-        """Set frame k of the block."""
-        self._position[k], self._quaternion[k] = data.xpos, data.xquat[:, [1, 2, 3, 0]]  # MuJoCo's wxyz to Rerun's xyzw
-        self._speed[k] = [_speed(self._model, data, root) for root in self._roots]
-        for i, bed in enumerate(self._beds):
-            self._ground[k, i] = _snapped(data.xpos[list(bed.bodies)].mean(axis=0), bed.sand, self._cell)
-        if not self._felt:
-            return
-        sand = wrenches(self._model, data)
-        found = [tractions(self._model, data, body) for body in self._felt]
-        magnitudes = [np.linalg.norm(one.stress, axis=1) for one in found]
-        self._scale = _Scale(
-            max(self._scale.force, np.linalg.norm(sand.force, axis=1).max()),
-            max(self._scale.traction, *(one.max() for one in magnitudes)),
-        )
-        self._force[k], self._moment[k] = sand.force[self._felt], sand.moment[self._felt]
-        self._arrows[k] = self._force[k] * (self._extent / self._scale.force)
-        self._depth[k] = [one.depth.max() for one in found]
-        self._power[k], self._scales[k] = sand.power.sum(), self._scale
-        for skin, colours, one, magnitude in zip(self._skins, self._colours, found, magnitudes, strict=True):
-            colours[k] = traction_colours(magnitude, one.active, self._scale.traction)[skin.nearest, None]
+    model: mujoco.MjModel
+    beds: "list[tuple[Instance, _Plane]]"
+    skins: "list[_Skin]"
+    roots: list[int]
+    """Bodies whose speed is shown; the view follows the first."""
+    weight: float
+    """Of all that can move [N]."""
+    centre: Array
+    """Of what can move, at the start [m]."""
+    extent: float
+    """[m]."""
+
+    @property
+    def cell(self) -> float:
+        """Side of the sand's grid [m]."""
+        return _round_number(self.extent / 3.0)
+
+    @property
+    def felt(self) -> list[int]:
+        """The bodies that feel sand."""
+        return [skin.body for skin in self.skins]
+
+    def name(self, body: int) -> str:
+        return self.model.body(body).name or f"body{body}"
 
 
-def traction_colours(magnitude: Array, active: NDArray[np.bool_], scale: float) -> NDArray[np.uint32]:
-    """Colours 0xRRGGBBAA of tractions [Pa] up to scale, (ntri,); grey where they are not active, or not numbers."""
-    shade = np.where(active & (magnitude <= scale), 1.0 + 254.0 / scale * magnitude, 0.0)
-    return _PALETTE[shade.astype(np.intp)]
+class _Skin(NamedTuple):
+    """The drawn triangles of a body that feels the sand."""
+
+    body: int
+    geoms: list[int]
+    """The geoms that they stand for."""
+    area: float
+    """[m^2]."""
+    triangles: Array
+    """Body frame [m], shape (nface, 3, 3)."""
+    nearest: NDArray[np.intp]
+    """The triangle of `tractions` that each shows, shape (nface,)."""
+
+
+class _Plane(NamedTuple):
+    """The surface of a bed of sand: unit vectors along, across and up, and its height along up [m]."""
+
+    along: Array
+    across: Array
+    up: Array
+    offset: float
+
+
+class _Frame(NamedTuple):
+    """One moment; or, with one more axis in front, all of them."""
+
+    time: Any
+    """[s]."""
+    position: Array
+    """[m], shape (nbody, 3)."""
+    quaternion: Array
+    """Rerun's, xyzw, shape (nbody, 4)."""
+    speed: Array
+    """[m/s], shape (nroot,)."""
+    force: Array
+    """[N], shape (nfelt, 3)."""
+    moment: Array
+    """[N m], shape (nfelt, 3)."""
+    depth: Array
+    """[m], shape (nfelt,)."""
+    power: Any
+    """[W]."""
+    traction: NDArray[np.float32]
+    """Of each drawn triangle of one skin after the other [Pa]; -1 where it is not active."""
+
+
+def _describe(model: mujoco.MjModel) -> _Scene:
+    start = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, start)
+    beds = instances(model)
+    skins = [_make_skin(model, start, body) for bed in beds for body in bed.bodies]
+    roots = np.unique(model.body_rootid[[skin.body for skin in skins] or slice(1, None)]).tolist()
+    weight = float(model.body_mass[model.body_weldid != 0].sum() * np.linalg.norm(model.opt.gravity))
+    return _Scene(model, [(bed, _make_plane(bed.sand)) for bed in beds], skins, roots, weight, *_bounds(model, start))
+
+
+def _make_skin(model: mujoco.MjModel, start: mujoco.MjData, body: int) -> _Skin:
+    """What feels the sand has no corners, so they come from the geoms: those that have its area."""
+    felt = tractions(model, start, body)
+    area = float(felt.area.sum())
+    own = range(model.body_geomadr[body], model.body_geomadr[body] + model.body_geomnum[body])
+    for collision_only in (True, False):
+        drawn = body_surface(model, body, collision_only=collision_only, max_edge=None, allow_open=True)
+        geoms = [geom for geom in own if is_colliding(model, geom) or not collision_only]
+        if drawn is not None and np.isclose(drawn.areas.sum(), area):
+            break
+    assert drawn is not None, "a body that feels sand has geoms"
+    rotation = start.xmat[body].reshape(3, 3)
+    centres, normals = (felt.centre - start.xpos[body]) @ rotation, drawn.size * felt.normal @ rotation
+    tree = cKDTree(np.hstack([centres, normals]))  # normals too, so that thin plates keep their sides apart
+    _, nearest = tree.query(np.hstack([drawn.centres, drawn.size * drawn.normals]))
+    return _Skin(body, geoms, area, drawn.triangles, nearest)
+
+
+def _make_plane(sand: Array) -> _Plane:
+    value = dict(zip(packed.SAND_FIELDS, sand.tolist(), strict=True))
+    up = np.array([value["up_x"], value["up_y"], value["up_z"]])
+    along = np.array([up[2], 0.0, -up[0]]) / math.hypot(up[2], up[0])
+    return _Plane(along, np.cross(up, along), up, value["offset"])
+
+
+def _bounds(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[Array, float]:
+    """Centre and longest side of a box around the geoms that can move, or MuJoCo's where none can [m]."""
+    geoms = (model.body_weldid[model.geom_bodyid] != 0) & (model.geom_rbound > 0.0)
+    if not geoms.any():
+        return model.stat.center.copy(), float(model.stat.extent)
+    radii = model.geom_rbound[geoms, None]
+    low, high = (data.geom_xpos[geoms] - radii).min(axis=0), (data.geom_xpos[geoms] + radii).max(axis=0)
+    return 0.5 * (low + high), float((high - low).max())
+
+
+def _sample(scene: _Scene, data: mujoco.MjData, time: float) -> _Frame:
+    sand, felt = wrenches(scene.model, data), scene.felt
+    found = [tractions(scene.model, data, body) for body in felt]
+    shown = [
+        np.where(one.active, np.linalg.norm(one.stress, axis=1), -1.0)[skin.nearest]
+        for one, skin in zip(found, scene.skins, strict=True)
+    ]
+    return _Frame(
+        time=time,
+        position=data.xpos.copy(),
+        quaternion=data.xquat[:, [1, 2, 3, 0]],
+        speed=np.linalg.norm(body_velocities(scene.model, data)[0][scene.roots], axis=1),
+        force=sand.force[felt],
+        moment=sand.moment[felt],
+        depth=np.array([one.depth.max() for one in found]),
+        power=sand.power.sum(),
+        traction=np.concatenate([np.empty(0), *shown], dtype=np.float32),
+    )
+
+
+def _send(
+    stream: rr.RecordingStream, scene: _Scene, frames: list[_Frame], scalars: Mapping[str, list[tuple[float, float]]]
+) -> Counter[str]:
+    """Send everything; returns how many rows each entity has."""
+    rows: Counter[str] = Counter()
+
+    def send(time: Array, entity: str, archetype: Any, fields: Mapping[str, NDArray[Any]]) -> None:
+        for start in range(0, len(time), _BLOCK):
+            block = slice(start, start + _BLOCK)
+            columns = archetype.columns(**{field: values[block] for field, values in fields.items()})
+            stream.send_columns(entity, [rr.TimeColumn("sim_time", duration=time[block])], columns)
+        rows[entity] += len(time)
+
+    stacked = _Frame(*map(np.array, zip(*frames, strict=True))) if frames else None
+    scales = _scales(scene, stacked)
+    for entity, shown in _static(scene, *scales):
+        stream.log(entity, shown, static=True)
+        rows[entity] += 1
+    if stacked is not None:
+        for channel in _channels(scene, stacked, *scales):
+            send(stacked.time, *channel)
+    for entity, pairs in scalars.items():
+        time, values = np.array(pairs).T
+        send(time, entity, rr.Scalars, {"scalars": values})
+    return rows
+
+
+def _put(recording: bytes, rows: Mapping[str, int], path: Path) -> None:
+    """Write a file and see that each entity has all its rows in it, then put it in place."""
+    temporary = _beside(path)
+    try:
+        temporary.write_bytes(recording)
+        found: Counter[str] = Counter()
+        for chunk in RrdReader(temporary).stream():
+            found[chunk.entity_path] += chunk.num_rows
+        missing = [entity for entity, count in rows.items() if found[entity] < count]
+        if missing:
+            raise RftsimError(f"rows are missing of {', '.join(missing)}")
+        os.replace(temporary, path)
+    except (OSError, ValueError, RuntimeError) as error:
+        raise RftsimError(f"the recording could not be written to {path}: {error}") from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _check_writable(path: Path) -> None:
+    if path.suffix != ".rrd":
+        raise RftsimError(f"a recording must be called *.rrd, by which Rerun knows it, not {path.name!r}")
+    try:
+        if path.exists() and not (path.is_file() and os.access(path, os.W_OK)):
+            raise RftsimError(f"cannot write {path}: it exists and is not a file that may be replaced")
+        temporary = _beside(path)
+        temporary.touch(exist_ok=False)
+        temporary.unlink()
+    except OSError as error:
+        raise RftsimError(f"cannot write {path}: {error.strerror}") from error
+
+
+def _beside(path: Path) -> Path:
+    return path.with_name(f".{path.stem}-{uuid.uuid4().hex[:8]}.rrd")
+
+
+def _scales(scene: _Scene, frames: _Frame | None) -> tuple[float, float]:
+    """Force [N] of an arrow as long as the extent and traction [Pa] of the strongest colour."""
+    force = max(scene.weight, 1e-12)
+    traction = force / (sum(skin.area for skin in scene.skins) or 1.0)
+    if frames is None:
+        return force, traction
+    return _strong(np.linalg.norm(frames.force, axis=2), force), _strong(frames.traction, traction)
+
+
+def _strong(values: NDArray[np.floating[Any]], least: float) -> float:
+    """What 99 % of the positive values do not exceed, so that one spike does not dwarf the rest; not below least."""
+    positive = values[(values > 0.0) & np.isfinite(values)]
+    return max(least, float(np.percentile(positive, 99.0))) if positive.size else least
+
+
+def _channels(scene: _Scene, frames: _Frame, force_scale: float, traction_scale: float) -> Iterator[Channel]:
+    """What changes."""
+    for body in range(1, scene.model.nbody):
+        pose = {"translation": frames.position[:, body], "quaternion": frames.quaternion[:, body]}
+        yield _entity("world", "body", scene.name(body)), rr.Transform3D, pose
+    for root, speed in zip(scene.roots, frames.speed.T, strict=True):
+        yield _entity("speed", scene.name(root)), rr.Scalars, {"scalars": speed}
+    for bed, plane in scene.beds:
+        middle = frames.position[:, list(bed.bodies)].mean(axis=1)
+        yield _entity("world", "sand", bed.name), rr.Transform3D, {"translation": _snapped(middle, plane, scene.cell)}
+    if scene.skins:
+        yield "/sand/power", rr.Scalars, {"scalars": frames.power}
+    ends = np.cumsum([len(skin.nearest) for skin in scene.skins])
+    for i, skin in enumerate(scene.skins):
+        name, traction = scene.name(skin.body), frames.traction[:, ends[i] - len(skin.nearest) : ends[i]]
+        for quantity, values in ("force", frames.force), ("moment", frames.moment), ("depth", frames.depth):
+            yield _entity("sand", quantity, name), rr.Scalars, {"scalars": values[:, i]}
+        arrow = {"origins": frames.position[:, skin.body], "vectors": frames.force[:, i] * (scene.extent / force_scale)}
+        yield _entity("world", "force", name), rr.Arrows3D, arrow
+        colours = np.repeat(traction_colours(traction, traction_scale), 3, axis=1)  # one for each corner
+        yield _entity("world", "body", name, "skin"), rr.Mesh3D, {"vertex_colors": colours}
+
+
+def _static(scene: _Scene, force_scale: float, traction_scale: float) -> Iterator[tuple[str, rr.AsComponents]]:
+    """What stays."""
+    about = (
+        f"**Arrows**: the sand's force, {scene.extent:.3g} m long for {force_scale:.3g} N. **Colours**: traction, "
+        f"darkest from {traction_scale:.3g} Pa on; grey where the sand does not act. **Grid**: {scene.cell:g} m."
+    )
+    yield "/about", rr.TextDocument(about, media_type="text/markdown")
+    yield "/world", rr.ViewCoordinates.RIGHT_HAND_Z_UP
+    for bed, plane in scene.beds:
+        for shape in _sand_shape(plane, scene.cell):
+            yield _entity("world", "sand", bed.name), shape
+    for skin in scene.skins:
+        name = scene.name(skin.body)
+        yield _entity("world", "body", name, "skin"), _mesh(skin.triangles)
+        yield _entity("world", "force", name), rr.Arrows3D.from_fields(radii=0.01 * scene.extent, colors=0x2878FFFF)
+        for quantity in ("force", "moment"):
+            yield _entity("sand", quantity, name), rr.SeriesLines(names=[f"{name} {axis}" for axis in "xyz"])
+    skinned = [geom for skin in scene.skins for geom in skin.geoms]
+    for geom in np.setdiff1d(range(scene.model.ngeom), skinned).tolist():
+        body = int(scene.model.geom_bodyid[geom])
+        mesh = _geom_mesh(scene.model, geom, opacity=0.3 if body in scene.felt else 1.0)  # not to hide the skin
+        if mesh is not None:
+            name = scene.model.geom(geom).name or f"geom{geom}"
+            yield _entity("world", "body", scene.name(body), name), mesh
+
+
+def traction_colours(traction: NDArray[np.floating[Any]], scale: float) -> NDArray[np.uint32]:
+    """Colours 0xRRGGBBAA of tractions [Pa], the darkest from scale on; grey where they are negative, or not numbers."""
+    strength = np.minimum(np.where(traction >= 0.0, traction, 0.0) / scale, 1.0)
+    return _PALETTE[np.where(traction >= 0.0, 1.0 + 254.0 * strength, 0.0).astype(np.intp)]
 
 
 def _palette() -> NDArray[np.uint32]:
@@ -227,86 +419,12 @@ def _palette() -> NDArray[np.uint32]:
 _PALETTE: Final = _palette()
 
 
-class _Scale(NamedTuple):
-    force: float
-    """Of an arrow as long as the bodies' extent [N]."""
-    traction: float
-    """Of the strongest colour [Pa]."""
-
-
-def _first_scale(model: mujoco.MjModel, beds: Iterable[Instance]) -> _Scale:
-    """The weight of all that can move, and that over the area that feels sand."""
-    weight = float(model.body_mass[model.body_weldid != 0].sum() * np.linalg.norm(model.opt.gravity))
-    area = sum(float(_columns(surface)[6].sum()) for bed in beds for surface in bed.bodies.values())
-    return _Scale(max(weight, 1e-12), max(weight, 1e-12) / (area or 1.0))
-
-
-class _Skin(NamedTuple):
-    """The drawn triangles of a body that feels the sand."""
-
-    body: int
-    geoms: list[int]
-    """The geoms that they stand for."""
-    triangles: Array
-    """Body frame [m], shape (nface, 3, 3)."""
-    nearest: NDArray[np.intp]
-    """The triangle of the packed surface whose traction each shows, shape (nface,)."""
-
-
-def _make_skin(model: mujoco.MjModel, body: int, surface: Array) -> _Skin:
-    """The packed surface has no corners, so they come from the geoms, each with the traction nearest to it."""
-    own = range(model.body_geomadr[body], model.body_geomadr[body] + model.body_geomnum[body])
-    for collision_only in (True, False):
-        drawn = body_surface(model, body, collision_only=collision_only, max_edge=None, allow_open=True)
-        geoms = [geom for geom in own if is_colliding(model, geom) or not collision_only]
-        if drawn and np.allclose(
-            [drawn.triangles.min((0, 1)), drawn.triangles.max((0, 1))], surface[1:7].reshape(2, 3)
-        ):
-            break
-    assert drawn is not None, "a body that feels sand has geoms"
-    weights = np.array([1.0, 1.0, 1.0, *[drawn.size] * 3])  # normals too, so that thin plates keep their sides apart
-    _, nearest = cKDTree(_columns(surface)[:6].T * weights).query(np.hstack([drawn.centres, drawn.normals]) * weights)
-    return _Skin(body, geoms, drawn.triangles, nearest)
-
-
-def _columns(surface: Array) -> Array:
-    """Of a packed surface: centre (3), normal (3), area; shape (COLUMNS, ntri)."""
-    return surface[packed.HEADER :].reshape(packed.COLUMNS, -1)
-
-
-def _initial_bounds(model: mujoco.MjModel) -> tuple[Array, float]:
-    """Centre and longest side of a box around the geoms that can move, or all if none can [m]."""
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    geoms = (model.body_weldid[model.geom_bodyid] != 0) & (model.geom_rbound > 0.0)
-    if not geoms.any():
-        return model.stat.center.copy(), float(model.stat.extent)
-    radii = model.geom_rbound[geoms, None]
-    low, high = (data.geom_xpos[geoms] - radii).min(axis=0), (data.geom_xpos[geoms] + radii).max(axis=0)
-    return 0.5 * (low + high), float((high - low).max())
-
-
-def _speed(model: mujoco.MjModel, data: mujoco.MjData, body: int) -> float:
-    """Of the body's origin [m/s]."""
-    velocity = np.empty(6)
-    mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_XBODY, body, velocity, 0)
-    return float(np.linalg.norm(velocity[3:]))
-
-
-def _axes(sand: Array) -> tuple[Array, Array, Array]:
-    """Of a packed sand: along its surface, across, and up."""
-    up = sand[3:6]
-    along = np.array([up[2], 0.0, -up[0]]) / math.hypot(up[2], up[0])
-    return along, np.cross(up, along), up
-
-
-def _snapped(place: Array, sand: Array, cell: float) -> Array:
-    """The corner of the sand's grid nearest to a place."""
-    along, across, up = _axes(sand)
-    snapped: Array = sand[6] * up + cell * (
-        np.rint(place @ along / cell) * along + np.rint(place @ across / cell) * across
+def _snapped(place: Array, plane: _Plane, cell: float) -> Array:
+    """The corners of the sand's grid nearest to places, (n, 3)."""
+    corners: Array = plane.offset * plane.up + sum(
+        cell * np.rint(place @ axis / cell)[:, None] * axis for axis in (plane.along, plane.across)
     )
-    return snapped
+    return corners
 
 
 def _round_number(x: float) -> float:
@@ -315,9 +433,9 @@ def _round_number(x: float) -> float:
     return max(digit * power for digit in (1.0, 2.0, 5.0) if digit * power <= x)
 
 
-def _sand_shape(sand: Array, cell: float) -> tuple[rr.Mesh3D, rr.LineStrips3D]:
+def _sand_shape(plane: _Plane, cell: float) -> tuple[rr.Mesh3D, rr.LineStrips3D]:
     """A translucent square about the origin, and the grid on it."""
-    along, across, _ = _axes(sand)
+    along, across = plane.along, plane.across
     half = GRID_CELLS / 2 * cell
     corners = [half * (i * along + j * across) for i, j in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
     grid = [
@@ -354,10 +472,6 @@ def _mesh(triangles: Array, rgba: Array | None = None) -> rr.Mesh3D:
     )
 
 
-def _name(model: mujoco.MjModel, body: int) -> str:
-    return model.body(body).name or f"body{body}"
-
-
 def _entity(*parts: str) -> str:
     return rr.new_entity_path(list(parts))
 
@@ -371,21 +485,21 @@ def _scalar_entity(path: str) -> str:
     return _entity(*parts)
 
 
-def _blueprint(
-    centre: Array, extent: float, follow: str | None, with_sand: bool, scalars: Iterable[str]
-) -> rrb.Blueprint:
+def _blueprint(scene: _Scene, scalars: Iterable[str]) -> rrb.Blueprint:
     """The bodies on the left; plots of the sand and of each group of scalars on the right."""
     eye = rrb.EyeControls3D(
-        position=centre + extent * np.array([0.8, -1.6, 0.8]), look_target=centre, tracking_entity=follow
+        position=scene.centre + scene.extent * np.array([0.8, -1.6, 0.8]),
+        look_target=scene.centre,
+        tracking_entity=_entity("world", "body", scene.name(scene.roots[0])) if scene.roots else None,
     )
     view = rrb.Spatial3DView(origin="/world", name="Simulation", eye_controls=eye, line_grid=False)
     about = rrb.TextDocumentView(origin="/about", name="Scales")
-    plots = {"/sand/force": "Force [N]", "/sand/power": "Power [W]", "/sand/depth": "Depth [m]"} if with_sand else {}
+    plots = {"/sand/force": "Force [N]", "/sand/power": "Power [W]", "/sand/depth": "Depth [m]"} if scene.skins else {}
     plots |= {"/speed": "Speed [m/s]"}
     plots |= {f"/{group}": group for group in dict.fromkeys(entity.split("/")[1] for entity in scalars)}
     return rrb.Blueprint(
         rrb.Horizontal(
-            rrb.Vertical(view, about, row_shares=[6, 1]),
+            rrb.Vertical(view, about, row_shares=[7, 1]),
             rrb.Vertical(*(rrb.TimeSeriesView(origin=origin, name=name) for origin, name in plots.items())),
             column_shares=[2, 1],
         ),
@@ -393,100 +507,3 @@ def _blueprint(
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
     )
-
-
-class _Channel(NamedTuple):
-    """What one entity shows, frame by frame."""
-
-    entity: str
-    archetype: Any
-    fields: dict[str, NDArray[Any]]
-    """Arrays of a block's frames, (BLOCK, ...)."""
-
-
-class _File:
-    """A Rerun file that is written in blocks of frames and appears once it is complete."""
-
-    def __init__(self, path: Path, application_id: str) -> None:
-        self.pending, self.closed = 0, False
-        self.scalars: dict[str, list[tuple[float, float]]] = {}
-        """Time [s] and value of each, since the last block."""
-        self._path, self._temporary = path, _reserved(path)
-        self._time, self._channels, self._rows = np.empty(BLOCK), list[_Channel](), Counter[str]()
-        self._stream = rr.RecordingStream(application_id, recording_id=uuid.uuid4())
-        self._stream.save(self._temporary)
-        self._stream.send_recording_name(path.stem)
-
-    def log_static(self, entity: str, *shown: rr.AsComponents) -> None:
-        self._stream.log(entity, *shown, static=True)
-        self._rows[entity] += 1
-
-    def show(self, entity: str, archetype: Any, **fields: NDArray[Any]) -> None:
-        """Let an entity show arrays, (BLOCK, ...), of which the caller fills row `pending` before `end_frame`."""
-        self._channels.append(_Channel(entity, archetype, fields))
-
-    def end_frame(self, time: float, scalars: Mapping[str, float]) -> None:
-        for entity, value in scalars.items():
-            self.scalars.setdefault(entity, []).append((time, value))
-        self._time[self.pending] = time
-        self.pending += 1
-        if self.pending == BLOCK:
-            self._send_block()
-
-    def close(self, blueprint: rrb.Blueprint) -> None:
-        self.closed = True
-        try:
-            self._send_block()
-            self._stream.send_blueprint(blueprint)
-            self._stream.disconnect()
-            _check_rows(self._temporary, self._rows, self._path)
-            os.replace(self._temporary, self._path)
-        finally:
-            self._temporary.unlink(missing_ok=True)
-
-    def _send_block(self) -> None:
-        n, self.pending = self.pending, 0
-        if not n:
-            return
-        for channel in self._channels:
-            fields = {field: values[:n] for field, values in channel.fields.items()}
-            self._send(channel.entity, self._time[:n], channel.archetype.columns(**fields))
-        for entity, pairs in self.scalars.items():
-            if pairs:
-                time, values = np.array(pairs).T
-                self._send(entity, time, rr.Scalars.columns(scalars=values))
-                pairs.clear()
-
-    def _send(self, entity: str, time: Array, columns: Any) -> None:
-        self._stream.send_columns(entity, [rr.TimeColumn("sim_time", duration=time)], columns)
-        self._rows[entity] += len(time)
-
-
-def _reserved(path: Path) -> Path:
-    """An empty file beside the path, which shows that it can be written."""
-    if path.suffix != ".rrd":
-        raise RftsimError(f"a recording must be called *.rrd, by which Rerun knows it, not {path.name!r}")
-    temporary = path.with_name(f".{path.stem}-{uuid.uuid4().hex[:8]}.rrd")
-    try:
-        if path.exists() and not (path.is_file() and os.access(path, os.W_OK)):
-            raise RftsimError(f"cannot write {path}: it exists and is not a file that may be replaced")
-        temporary.touch(exist_ok=False)
-    except OSError as error:
-        raise RftsimError(f"cannot write {path}: {error.strerror}") from error
-    return temporary
-
-
-def _check_rows(written: Path, sent: Mapping[str, int], path: Path) -> None:
-    """Read a finished file back and see that each entity has all its rows."""
-    found: Counter[str] = Counter()
-    try:
-        for chunk in RrdReader(written).stream():
-            found[chunk.entity_path] += chunk.num_rows
-    except (OSError, ValueError, RuntimeError) as error:
-        raise RftsimError(f"the recording {path} cannot be read back; is the disk full? {error}") from error
-    missing = {entity: rows - found[entity] for entity, rows in sent.items() if found[entity] < rows}
-    if missing:
-        raise RftsimError(
-            f"the recording {path} lacks {sum(missing.values())} of {sum(sent.values())} rows, among them of "
-            f"{next(iter(missing))}; is the disk full?"
-        )

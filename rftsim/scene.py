@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rftsim import packed
+from rftsim.engine import instance as engine
 from rftsim.engine import plugin
 from rftsim.errors import RftsimWarning, SceneError
 from rftsim.geometry import body_surface, geom_label, is_colliding
@@ -54,6 +55,7 @@ def add_sand(
     allow_open: bool = False,
     sensors: bool = True,
     draw: bool = True,
+    force: Literal["implicit", "explicit"] = "implicit",
     name: str = "sand",
 ) -> Bed:
     """Put sand under a model that is not compiled yet.
@@ -76,6 +78,8 @@ def add_sand(
         allow_open: Accept meshes that are not closed.
         sensors: Add the sensors.
         draw: Draw the free surface as a translucent plane.
+        force: `implicit`: the force at the end of each step, exact at rest and at long steps; `explicit`: the force at
+            the velocity of the moment. The integrator RK4 always takes the explicit one.
         name: Name of the bed, where a model has several.
 
     Returns:
@@ -85,9 +89,11 @@ def add_sand(
         RftsimError: The scene cannot have sand: unknown bodies, surfaces that bound nothing, flags that would skip it.
     """
     plugin.register()
+    if force not in ("implicit", "explicit"):
+        raise SceneError(f"force must be 'implicit' or 'explicit', not {force!r}")
     bed_sand, bed_law = make_sand(sand), get_law(law)
     free_surface = surface if isinstance(surface, FreeSurface) else FreeSurface(height=surface)
-    numbers = packed.pack_sand(bed_sand, bed_law, free_surface, plane)
+    numbers = packed.pack_sand(bed_sand, bed_law, free_surface, plane, force == "implicit")
     _name_bodies(spec)
     model = _compiled(spec)
     _check_options(model, bed_sand)
@@ -313,12 +319,12 @@ def _write(spec: mujoco.MjSpec, name: str, numbers: np.ndarray, surfaces: Mappin
         raise SceneError(f"the model has a plugin instance {name!r} already: give this bed another name")
     spec.activate_plugin(plugin.PLUGIN)
     instance = spec.add_plugin(name=name, plugin_name=plugin.PLUGIN, active=True)
-    spec.add_numeric(name=plugin.SAND_MARKER + name, data=numbers, size=numbers.size)
+    spec.add_numeric(name=engine.SAND_MARKER + name, data=numbers, size=numbers.size)
     for body_name, surface in surfaces.items():
         body = spec.body(body_name)
         _attach(body.plugin, instance)
         data = packed.pack_surface(surface)
-        spec.add_numeric(name=plugin.BODY_MARKER + body_name, data=data, size=data.size)
+        spec.add_numeric(name=engine.BODY_MARKER + body_name, data=data, size=data.size)
         if sensors:
             sensor = spec.add_sensor(
                 name=f"{body_name}_sand",

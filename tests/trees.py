@@ -25,9 +25,9 @@ def spec_of(bodies=BALL, option="", extra=""):
     return mujoco.MjSpec.from_string(xml(bodies, option, extra))
 
 
-def sandy(bodies=BALL, option="", sand=SAND, law="rft3d", **options):
+def sandy(mjcf=BALL, option="", sand=SAND, law="rft3d", **options):
     """A compiled model with sand under it."""
-    spec = spec_of(bodies, option)
+    spec = spec_of(mjcf, option)
     add_sand(spec, sand, law, **options)
     return spec.compile()
 

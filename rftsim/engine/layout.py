@@ -58,13 +58,43 @@ class Model(NamedTuple):
     name_bodyadr: int
     name_numericadr: int
     name_pluginadr: int
+    plugin_stateadr: int
+    M_rownnz: int
+    M_rowadr: int
+    M_colind: int
+    D_rownnz: int
+    D_rowadr: int
+    D_colind: int
+    dof_damping: int
+    opt_timestep: int
+    opt_integrator: int
+    opt_disableflags: int
 
 
 class Data(NamedTuple):
     """Byte offsets in mjData."""
 
+    nefc: int
     plugin_data: int
+    plugin_state: int
     qvel: int
+    qfrc_applied: int
+    qfrc_actuator: int
+    qfrc_bias: int
+    xfrc_applied: int
+    xipos: int
+    M: int
+    qDeriv: int
+    efc_type: int
+    efc_id: int
+    efc_J: int
+    efc_J_rownnz: int
+    efc_J_rowadr: int
+    efc_J_colind: int
+    efc_D: int
+    efc_aref: int
+    efc_frictionloss: int
+    efc_KBIP: int
     xpos: int
     xmat: int
     cvel: int
@@ -101,7 +131,8 @@ def _struct(name: str) -> type[ctypes.Structure]:
 
 _PROBE = """
 <mujoco>
-  <worldbody><body><joint/><geom size="1"/></body></worldbody>
+  <worldbody><body><joint limited="true" range="10 20" damping="1" frictionloss="1"/><geom size="1"/></body></worldbody>
+  <option jacobian="sparse"/>
   <custom><numeric name="n" data="1 2"/></custom>
   <sensor><clock name="clock"/></sensor>
 </mujoco>
@@ -116,25 +147,35 @@ def layout() -> tuple[Model, Data]:
         LayoutError: MuJoCo's description of its structs does not hold.
     """
     model_struct, data_struct = _struct("mjModel"), _struct("mjData")
-    model_offsets = Model(*(getattr(model_struct, name).offset for name in Model._fields))
+    model_offsets = Model(*(_offset(model_struct, name) for name in Model._fields))
     data_offsets = Data(*(getattr(data_struct, name).offset for name in Data._fields))
     model = mujoco.MjModel.from_xml_string(_PROBE)
     data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
     _verify(model, model_struct.from_address(model._address), Model._fields)
     _verify(data, data_struct.from_address(data._address), Data._fields)
     return model_offsets, data_offsets
 
 
+def _offset(struct: type[ctypes.Structure], name: str) -> int:
+    """Offset of a field, or of `opt_x`, a field of the options."""
+    if name.startswith("opt_"):
+        return struct.opt.offset + getattr(_struct("mjOption"), name[4:]).offset  # type: ignore[no-any-return,attr-defined]
+    return getattr(struct, name).offset  # type: ignore[no-any-return]
+
+
 def _verify(owner: Any, memory: ctypes.Structure, names: tuple[str, ...]) -> None:
     for name in names:
-        value = getattr(owner, name, None)
+        value, held = getattr(owner, name, None), getattr(memory, name, None)
+        if name.startswith("opt_"):
+            value, held = getattr(owner.opt, name[4:]), getattr(memory.opt, name[4:])
         if isinstance(value, np.ndarray) and value.size:
-            expected = value.ctypes.data
-        elif isinstance(value, int):
+            expected: float = value.ctypes.data
+        elif isinstance(value, int | float):
             expected = value
         else:
             continue  # an empty array, or the bytes of the names: nothing to compare with
-        if getattr(memory, name) != expected:
+        if held != expected:
             raise LayoutError(
                 f"MuJoCo {mujoco.__version__} does not keep {name} where it says; rftsim needs mujoco>=3.17,<4"
             )

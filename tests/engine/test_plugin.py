@@ -9,6 +9,7 @@ from trees import BALL, JOINTS, SAND, applied, sandy, shaken, spec_of, trajector
 
 from rftsim import add_sand, instances, surface_force, tractions, wrenches
 
+
 @pytest.mark.parametrize("seed", range(10))
 def test_force_is_the_transposed_jacobian_times_the_wrench(seed):
     """qfrc_passive = sum over bodies of J_p^T f + J_r^T t, against mj_applyFT, on random trees of every joint."""
@@ -71,6 +72,25 @@ def test_one_number_everywhere(law):
     assert not found.force[0].any()
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_bodies_are_felt_from_their_first_triangle(seed):
+    """What is passed over above the sand is above it: lowered by millimetres, the wrench is the sum of tractions."""
+    rng = np.random.default_rng(seed)
+    model = sandy(tree(rng, ["free"]), max_edge=0.01)
+    data = mujoco.MjData(model)
+    data.qpos[3:7] = rng.normal(size=4)
+    data.qvel[:] = rng.normal(size=6)
+    felt = 0
+    for height in np.arange(0.2, -0.2, -0.004):
+        data.qpos[2] = height
+        mujoco.mj_forward(model, data)
+        faces = tractions(model, data, 1)
+        forces = faces.stress * faces.area[:, None]
+        felt += forces.any()
+        np.testing.assert_allclose(wrenches(model, data).force[1], forces.sum(axis=0), rtol=1e-9, atol=1e-12)
+    assert 10 < felt < 90
+
+
 def test_free_fall_above_the_sand_is_free():
     """Nothing acts above the sand: the ball falls by g t^2 / 2, as without."""
     high = BALL.replace(".02", "5")
@@ -81,9 +101,7 @@ def test_free_fall_above_the_sand_is_free():
 
 def test_readout_names_bodies_without_sand():
     """Asking for the tractions of a body that feels none is an error that says so."""
-    spec = spec_of(BALL + BALL.replace("ball", "other"))
-    add_sand(spec, SAND, bodies=["ball"])
-    model = spec.compile()
+    model = sandy(BALL + BALL.replace("ball", "other"), bodies=["ball"])
     data = shaken(model)
     assert not wrenches(model, data).force[model.body("other").id].any()
     with pytest.raises(ValueError, match="other"):

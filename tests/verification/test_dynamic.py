@@ -35,7 +35,9 @@ def test_inertial_term(static, dynamic, seed):
     n = n * np.sign(n @ v)
     for depth in (0.01, 1.0):
         face = plate(n, area=0.02, centre=(0, 0, -depth))
-        extra = surface_force(face, SAND, dynamic, velocity=v).force - surface_force(face, SAND, static, velocity=v).force
+        extra = (
+            surface_force(face, SAND, dynamic, velocity=v).force - surface_force(face, SAND, static, velocity=v).force
+        )
         np.testing.assert_allclose(extra, -1.1 * 638.0 * 0.02 * (n @ v) ** 2 * n, rtol=1e-9)
     assert not alpha(-n, v, dynamic, SAND).any()
 
@@ -72,8 +74,8 @@ def test_fall_behind_a_wheel(rpm, fall):
 def test_only_the_rear_half_of_the_contact_arc_falls(law, sense, heading):
     """Section 4.6.2: the contact region is halved by the angle that it subtends at the wheel's centre.
 
-    A wheel of radius r that turns at its place, its centre at r / 2 above the sand, touches it 60 deg before and behind;
-    its leading triangles are those whose n . (omega x r) > 0, all in rounding, so a sinking speed makes all lead.
+    A wheel of radius r that turns at its place, its centre at r / 2 above the sand, touches it 60 deg before and
+    behind. Turning alone makes no triangle of a round rim lead, but for rounding; a sinking speed makes all lead.
     """
     turn = about((0, 0, 1), heading)
     plane = turn @ [0, 1, 0]
@@ -160,13 +162,17 @@ def test_rounding_does_not_choose_the_rear():
 @pytest.mark.parametrize("law", ["rft2d", "drft2d", "rft3d", "drft3d", "rft3d:c4", "drft3d:c4"])
 @pytest.mark.parametrize(("q", "r", "s"), [(4.0, 1.0, 1.0), (1.0, 2.0, 8.0), (0.38, 3.0, 5.0)])
 def test_dimensional_scaling(law, q, r, s):
-    """Slonaker's scaling: g -> q g, L -> r L, width -> s r^-2 of it, omega -> (q / r)^1/2 omega scale a wheel's force by
-    q s, its moment by q s r and its power by q^3/2 r^1/2 s; in 3D, where the sides count, for s = r^3."""
+    """Slonaker's scaling of a wheel: force by q s, moment by q s r, power by q^3/2 r^1/2 s.
+
+    With g -> q g, lengths -> r, width -> s r^-2 of itself, omega -> (q / r)^1/2; in 3D, where the sides count, s = r^3.
+    """
     s = s if "2d" in law else r**3
     motion = {"position": np.array([0, 0, R / 3]), "velocity": np.array([0.2, 0, -0.05])}
     omega = np.array([0, 8.0, 0])
     small = surface_force(wheel(), SAND, law, **motion, angular_velocity=omega)
-    stretched = make_surface((rim(R).triangles * [r, s / r**2, r]).reshape(-1, 3), np.arange(3 * rim(R).ntri).reshape(-1, 3))
+    stretched = make_surface(
+        (rim(R).triangles * [r, s / r**2, r]).reshape(-1, 3), np.arange(3 * rim(R).ntri).reshape(-1, 3)
+    )
     large = surface_force(
         dataclasses.replace(stretched, wheel=Wheel((0, 1, 0), (0, 0, 0), r * R)),
         SAND.replace(g=q * SAND.g),
@@ -182,7 +188,11 @@ def test_dimensional_scaling(law, q, r, s):
 
 def test_dynamic_laws_do_depend_on_speed():
     """Appendix B.2: without the dynamic terms only v / (r omega) matters; with them it does not suffice."""
-    motion = {"position": (0, 0, R / 2), "velocity": np.array([0.3, 0, -0.1]), "angular_velocity": np.array([0, 6.0, 0])}
+    motion = {
+        "position": (0, 0, R / 2),
+        "velocity": np.array([0.3, 0, -0.1]),
+        "angular_velocity": np.array([0, 6.0, 0]),
+    }
     faster = motion | {name: 2 * motion[name] for name in ("velocity", "angular_velocity")}
     for static, dynamic in PAIRS:
         one, two = (surface_force(wheel(), SAND, static, **m).force for m in (motion, faster))

@@ -1,0 +1,28 @@
+"""The sand's force at the velocity of the moment."""
+
+from numba import njit
+
+from rftsim import packed
+from rftsim.engine import bodies, instance
+from rftsim.memory import doubles, pointer
+
+
+@njit
+def press(model, data, m, d, number):
+    """Evaluate the sand on every body of the instance and add it to qfrc_passive."""
+    address = instance.slot(data, d, number)[0]
+    table, wrenches = instance.table(address), instance.wrenches(address)
+    sand = instance.numeric(model, m, table[1])
+    t = bodies.tree(model, data, m, d)
+    force = doubles(pointer(d + data.qfrc_passive), pointer(m + model.nv))
+    for k in range(table[0]):
+        body = table[instance.HEAD + 2 * k]
+        surface = instance.numeric(model, m, table[instance.HEAD + 2 * k + 1])
+        v, w = bodies.twist(t, body)
+        x = t.xpos[3 * body : 3 * body + 3]
+        f = packed.packed_wrench(sand, surface, x, t.xmat[9 * body : 9 * body + 9], v, w)
+        for i in range(6):
+            wrenches[instance.WRENCH * k + i] = f[i]
+        bodies.add_wrench(t, body, x, (f[0], f[1], f[2]), (f[3], f[4], f[5]), force)
+    counted = instance.counters(address)
+    counted[0], counted[1], counted[2] = 1.0, 0.0, 0.0

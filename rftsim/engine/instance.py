@@ -1,0 +1,206 @@
+"""A plugin instance: which bodies feel its sand, where their numbers lie in the model, and what it remembers.
+
+The numbers are found by name. A numeric is a body's surface, or a bed's parameters, where its name without the marker
+is the body's, or the instance's, name; so MJCF attachment may put any prefix and suffix around both.
+
+What hangs on mjData (`plugin_data`) is one block: int64 [number of bodies, numeric of the bed, (body, numeric of its
+surface) ...], then float64 [last wrench of each body (6), counters (COUNTERS), state after the step under way]. What
+must last is MuJoCo's `plugin_state`, and is brought up to date only when a step ends.
+"""
+
+import ctypes
+from typing import Final
+
+from numba import njit
+
+from rftsim import stepping
+from rftsim.memory import allocate, characters, doubles, int32s, int64s, pointer, release
+
+BODY_MARKER: Final = "rftsim-body:"
+SAND_MARKER: Final = "rftsim-sand:"
+WRENCH: Final = 6
+"""Numbers of a wrench: force, then moment about the body's origin, in the world frame."""
+COUNTERS: Final = 7
+"""Evaluations, Jacobians and unsolved equations of the last force; then steps, and the sums of those three."""
+HEAD: Final = 2
+SIZE: Final = 8
+
+_BODY_MARKER, _SAND_MARKER = BODY_MARKER.encode(), SAND_MARKER.encode()
+
+
+@njit
+def _is_marked(names, numeric, marker, owner):
+    """Whether the name at `numeric` is the name at `owner` with the marker inserted somewhere."""
+    same = 0
+    while names[numeric + same] != 0 and names[numeric + same] == names[owner + same]:
+        same += 1
+    for start in range(same + 1):
+        k = 0
+        while k < len(marker) and names[numeric + start + k] == marker[k]:
+            k += 1
+        if k < len(marker):
+            continue
+        i = start
+        while names[owner + i] != 0 and names[numeric + i + k] == names[owner + i]:
+            i += 1
+        if names[owner + i] == 0 and names[numeric + i + k] == 0:
+            return True
+    return False
+
+
+@njit
+def _find_numeric(model, m, marker, owner):
+    names = characters(pointer(m + model.names))
+    count = pointer(m + model.nnumeric)
+    address = int32s(pointer(m + model.name_numericadr), count)
+    for i in range(count):
+        if _is_marked(names, address[i], marker, owner):
+            return i
+    return -1
+
+
+@njit
+def numeric(model, m, i):
+    """A numeric field of the model, as a view."""
+    count = pointer(m + model.nnumeric)
+    start = int32s(pointer(m + model.numeric_adr), count)[i]
+    size = int32s(pointer(m + model.numeric_size), count)[i]
+    return doubles(pointer(m + model.numeric_data) + SIZE * start, size)
+
+
+@njit
+def count_bodies(model, m, instance):
+    """How many bodies name the instance."""
+    nbody = pointer(m + model.nbody)
+    plugins = int32s(pointer(m + model.body_plugin), nbody)
+    n = 0
+    for body in range(nbody):
+        n += plugins[body] == instance
+    return n
+
+
+@njit
+def state_size(model, m, instance):
+    """Numbers that last from step to step."""
+    return stepping.state_size(count_bodies(model, m, instance), pointer(m + model.nv))
+
+
+@njit
+def slot(data, d, instance):
+    """Where mjData keeps the address of an instance's block, (1,)."""
+    return int64s(pointer(d + data.plugin_data) + SIZE * instance, 1)
+
+
+@njit
+def table(address):
+    """The integers of a block."""
+    return int64s(address, HEAD + 2 * pointer(address))
+
+
+@njit
+def wrenches(address):
+    """The last wrench of each body, (6 n,)."""
+    n = pointer(address)
+    return doubles(address + SIZE * (HEAD + 2 * n), WRENCH * n)
+
+
+@njit
+def counters(address):
+    """The counters of a block, (COUNTERS,)."""
+    n = pointer(address)
+    return doubles(address + SIZE * (HEAD + (2 + WRENCH) * n), COUNTERS)
+
+
+@njit
+def pending(address, size):
+    """The state after the step under way, (size,)."""
+    n = pointer(address)
+    return doubles(address + SIZE * (HEAD + (2 + WRENCH) * n + COUNTERS), size)
+
+
+@njit
+def lasting(model, data, m, d, instance):
+    """The state after the last step, a view of MuJoCo's plugin_state."""
+    start = int32s(pointer(m + model.plugin_stateadr), pointer(m + model.nplugin))[instance]
+    return doubles(pointer(d + data.plugin_state) + SIZE * start, state_size(model, m, instance))
+
+
+@njit
+def initialise(model, data, m, d, instance):
+    """Make the block of an instance; -1 where a body or the bed has no numbers."""
+    n = count_bodies(model, m, instance)
+    nbody = pointer(m + model.nbody)
+    plugins = int32s(pointer(m + model.body_plugin), nbody)
+    names = int32s(pointer(m + model.name_bodyadr), nbody)
+    instances = int32s(pointer(m + model.name_pluginadr), pointer(m + model.nplugin))
+    address = allocate(HEAD + (2 + WRENCH) * n + COUNTERS + state_size(model, m, instance), SIZE)
+    if address == 0:
+        return -1
+    int64s(address, 1)[0] = n
+    entries = table(address)
+    entries[1] = _find_numeric(model, m, _SAND_MARKER, instances[instance])
+    complete = entries[1] >= 0
+    k = HEAD
+    for body in range(nbody):
+        if plugins[body] == instance:
+            entries[k] = body
+            entries[k + 1] = _find_numeric(model, m, _BODY_MARKER, names[body])
+            complete = complete and entries[k + 1] >= 0
+            k += 2
+    if not complete:
+        release(address)
+        return -1
+    slot(data, d, instance)[0] = address
+    return 0
+
+
+@njit
+def copy(model, data, target, m, origin, instance):
+    """Give another mjData a copy of the block; what it had is released."""
+    address = slot(data, origin, instance)[0]
+    size = HEAD + (2 + WRENCH) * pointer(address) + COUNTERS + state_size(model, m, instance)
+    block, copied = int64s(address, size), allocate(size, SIZE)
+    fresh = int64s(copied, size)
+    for i in range(size):
+        fresh[i] = block[i]
+    slot(data, target, instance)[0] = copied
+
+
+@njit
+def forget(address):
+    """Clear the wrenches and counters."""
+    for values in (wrenches(address), counters(address)):
+        for i in range(values.size):
+            values[i] = 0.0
+
+
+@njit
+def keep(model, data, m, d, instance):
+    """End a step: what it left pending lasts, and its work is counted."""
+    address = slot(data, d, instance)[0]
+    state = lasting(model, data, m, d, instance)
+    waiting = pending(address, state.size)
+    for i in range(state.size):
+        state[i] = waiting[i]
+    counted = counters(address)
+    counted[3] += 1.0
+    for k in range(3):
+        counted[4 + k] += counted[k]
+
+
+def read_wrenches(address: int) -> list[tuple[int, tuple[float, ...]]]:
+    """Each body's id and last wrench, from the block at `address`."""
+    n, entries, numbers = _read(address)
+    return [(entries[HEAD + 2 * k], tuple(numbers[WRENCH * k : WRENCH * (k + 1)])) for k in range(n)]
+
+
+def read_counters(address: int) -> tuple[float, ...]:
+    """Steps, evaluations, Jacobians and unsolved equations since the last reset, from the block at `address`."""
+    n, _, numbers = _read(address)
+    return tuple(numbers[WRENCH * n + 3 : WRENCH * n + COUNTERS])
+
+
+def _read(address: int) -> "tuple[int, ctypes.Array[ctypes.c_int64], ctypes.Array[ctypes.c_double]]":
+    n = ctypes.c_int64.from_address(address).value
+    entries = (ctypes.c_int64 * (HEAD + 2 * n)).from_address(address)
+    return n, entries, (ctypes.c_double * (WRENCH * n + COUNTERS)).from_address(address + ctypes.sizeof(entries))
