@@ -5,8 +5,8 @@ it chatters and is biased; here v+ solves
 
     M (v+ - v) = h (tau + J' f(v+) + Q(v+)),
 
-tau the other smooth forces, f the constraints' by MuJoCo's own law, Q the sand's with |v| / sqrt(|v|^2 + V_C^2) in front
-of each triangle's stress. The solver is Newton's method with kept Jacobians (a rank-one update per body and iteration);
+tau the other smooth forces, f the constraints' by MuJoCo's own law, Q the sand's with |v| / sqrt(|v|^2 + V_C^2) before
+each triangle's stress. The solver is Newton's method with kept Jacobians (a rank-one update per body and iteration);
 where the exact Jacobian overshoots rest, one that is secant along the motion takes its place.
 
 All twists and wrenches here are about the body's origin, in world axes: velocity or force first.
@@ -20,20 +20,14 @@ from numba import njit
 from rftsim import dense, kernels, packed
 from rftsim.kernels import Frame
 from rftsim.memory import doubles
+from rftsim.native_ahead import V_C, ahead, jacobian
 
-V_C = 1e-6
-"""Speed below which a triangle's stress falls to zero [m/s]; bodies at rest creep at a fraction of it."""
-RAMP = 100.0
-"""Steepness of the leading-edge rule: faces fall out of it between n.v_hat = 0 and -1/RAMP."""
 TOLERANCE = 3e-3
 """Allowed error of a sand body's velocity, relative; V_C is added."""
 MOST = 40
 """Iterations of one solution."""
 LOOSEST = 20.0
 """Factor to which the tolerance is loosened, from the sixth iteration on."""
-
-FRAME = 15
-"""Numbers that fix a body's frame for a step: up, rise, forward, height, rear (4), drop."""
 
 
 class Bodies(NamedTuple):
@@ -135,16 +129,6 @@ def frame_at(bodies, b, twist):
 
 
 @njit
-def keep_frame(frame, out):
-    """Store what of a frame does not depend on the motion."""
-    for k in range(3):
-        out[k], out[3 + k], out[6 + k] = frame.up[k], frame.rise[k], frame.forward[k]
-    out[9], out[14] = frame.height, frame.drop
-    for k in range(4):
-        out[10 + k] = frame.rear[k]
-
-
-@njit
 def sink(bodies, v, h):
     """Move the depths by a time h of the motion v; positions and normals stay."""
     for b in range(bodies.length.size):
@@ -158,85 +142,28 @@ def sink(bodies, v, h):
 
 
 @njit
-def _surface(bodies, b):
+def surface_of(bodies, b):
+    """The packed surface of body b."""
     return doubles(bodies.surface[b, 0], bodies.surface[b, 1])
-
-
-@njit
-def _reach(surface, frame, h):
-    """How far any triangle can move in a time h [m]."""
-    x = max(abs(surface[1]), abs(surface[4]))
-    y = max(abs(surface[2]), abs(surface[5]))
-    z = max(abs(surface[3]), abs(surface[6]))
-    v, w = frame.v0, frame.omega
-    turn = np.sqrt((w[0] * w[0] + w[1] * w[1] + w[2] * w[2]) * (x * x + y * y + z * z))
-    return h * (np.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) + turn)
-
-
-@njit
-def _medium(sand, surface):
-    medium = packed.medium_of(sand, surface)
-    return kernels.Medium(medium.xi, medium.mu_surf, medium.lambda_rho, medium.edge_on, RAMP)
 
 
 @njit
 def evaluate(bodies, v, h, out):
     """Wrench of each body, at the present depths and at those after a time h, (nbody, 12)."""
     for b in range(bodies.length.size):
-        surface = _surface(bodies, b)
-        frame, medium = frame_at(bodies, b, twist_of(bodies, b, v)), _medium(bodies.sand, surface)
-        cx, cy, cz, nx, ny, nz, area = packed.columns(surface)
-        reach = _reach(surface, frame, h)
-        for k in range(12):
-            out[b, k] = 0.0
-        for first in range(0, area.size, kernels.BLOCK):
-            if packed.block_is_clear(surface, first // kernels.BLOCK, frame, reach):
-                continue
-            last = min(first + kernels.BLOCK, area.size)
-            if bodies.sand[0] == 0.0:
-                w = kernels.ahead_2d(cx, cy, cz, nx, ny, nz, area, first, last, frame, medium, V_C, h)
-            elif bodies.sand[0] == 1.0:
-                w = kernels.ahead_3d(cx, cy, cz, nx, ny, nz, area, first, last, frame, medium, V_C, h)
-            else:
-                w = kernels.ahead_3d_quartic(cx, cy, cz, nx, ny, nz, area, first, last, frame, medium, V_C, h)
-            for part in range(4):
-                x, y, z = packed.to_world(bodies.rotation[b], w[3 * part], w[3 * part + 1], w[3 * part + 2])
-                out[b, 3 * part] += x
-                out[b, 3 * part + 1] += y
-                out[b, 3 * part + 2] += z
+        twist = twist_of(bodies, b, v)
+        f, r = bodies.frame[b].ctypes.data, bodies.rotation[b].ctypes.data
+        ahead(bodies.sand.ctypes.data, bodies.surface[b, 0], f, r, twist.ctypes.data, h, out[b].ctypes.data)
 
 
 @njit
 def differentiate(bodies, v, completed, out):
     """Derivative of each body's wrench by its twist, (nbody, 6, 6)."""
-    scratch, local, turned = np.empty(9 * kernels.BLOCK), np.empty((6, 6)), np.empty((6, 6))
     for b in range(bodies.length.size):
-        surface = _surface(bodies, b)
-        frame, medium = frame_at(bodies, b, twist_of(bodies, b, v)), _medium(bodies.sand, surface)
-        cx, cy, cz, nx, ny, nz, area = packed.columns(surface)
-        for r in range(6):
-            for k in range(6):
-                local[r, k] = 0.0
-        for first in range(0, area.size, kernels.BLOCK):
-            if packed.block_is_clear(surface, first // kernels.BLOCK, frame, 0.0):
-                continue
-            last = min(first + kernels.BLOCK, area.size)
-            c = (cx, cy, cz, nx, ny, nz, area)
-            if bodies.sand[0] == 0.0:
-                kernels.jacobian_2d(*c, first, last, frame, medium, V_C, completed, scratch, local)
-            elif bodies.sand[0] == 1.0:
-                kernels.jacobian_3d(*c, first, last, frame, medium, V_C, completed, scratch, local)
-            else:
-                kernels.jacobian_3d_quartic(*c, first, last, frame, medium, V_C, completed, scratch, local)
-        xmat = bodies.rotation[b]
-        for half in range(0, 6, 3):  # R G R'
-            for k in range(6):
-                x, y, z = packed.to_world(xmat, local[half, k], local[half + 1, k], local[half + 2, k])
-                turned[half, k], turned[half + 1, k], turned[half + 2, k] = x, y, z
-        for half in range(0, 6, 3):
-            for r in range(6):
-                x, y, z = packed.to_world(xmat, turned[r, half], turned[r, half + 1], turned[r, half + 2])
-                out[b, r, half], out[b, r, half + 1], out[b, r, half + 2] = x, y, z
+        twist = twist_of(bodies, b, v)
+        f, r = bodies.frame[b].ctypes.data, bodies.rotation[b].ctypes.data
+        s, o = bodies.sand.ctypes.data, out[b].ctypes.data
+        jacobian(s, bodies.surface[b, 0], f, r, twist.ctypes.data, completed, o)
 
 
 @njit

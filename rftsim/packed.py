@@ -4,14 +4,13 @@ This is the form in which MuJoCo's models carry them (custom numeric fields), so
 per-simulation values all come with the model. Compiled code and Python read them through the same functions.
 """
 
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike
 
 from rftsim import kernels
-from rftsim.compiled import SOURCE
 from rftsim.kernels import Frame, Medium
 from rftsim.laws import Law
 from rftsim.sand import FreeSurface, Sand
@@ -19,9 +18,10 @@ from rftsim.surface import Array, Surface
 
 SAND_FIELDS: Final = (
     *("law", "planar", "dynamic", "up_x", "up_y", "up_z", "offset", "plane_x", "plane_y", "plane_z"),
-    *("xi_n", "zeta", "mu_surf", "rho_c", "lambda_", "g", "implicit"),
+    *("xi_n", "zeta", "mu_surf", "rho_c", "lambda_", "g"),
 )
 """Entries of a packed sand, in order."""
+SAND_SIZE: Final = len(SAND_FIELDS)
 
 HEADER: Final = 16
 """Numbers before the triangles of a packed surface.
@@ -37,7 +37,7 @@ BLOCK: Final = kernels.BLOCK
 stand behind the columns."""
 
 
-def pack_sand(sand: Sand, law: Law, free_surface: FreeSurface, plane: ArrayLike, implicit: bool = False) -> Array:
+def pack_sand(sand: Sand, law: Law, free_surface: FreeSurface, plane: ArrayLike) -> Array:
     """A sand bed as numbers, in the order of SAND_FIELDS.
 
     Raises:
@@ -51,7 +51,7 @@ def pack_sand(sand: Sand, law: Law, free_surface: FreeSurface, plane: ArrayLike,
         raise ValueError(f"the normal of the plane of motion must be horizontal, as (0, 1, 0) is, not {plane!r}")
     rho_c = sand.density() if law.dynamic else (sand.rho_c or 0.0)
     flags = (law.code, law.planar, law.dynamic)
-    strength = (sand.xi_n, sand.zeta, sand.mu_surf, rho_c, sand.lambda_, sand.g, implicit)
+    strength = (sand.xi_n, sand.zeta, sand.mu_surf, rho_c, sand.lambda_, sand.g)
     return np.array([*flags, *up, free_surface.offset, *(normal / length), *strength], dtype=float)
 
 
@@ -241,56 +241,3 @@ def _angle(t):
     c = 1.0 - abs(t)
     s = t if abs(t) <= 1.0 else (2.0 - t if t > 0.0 else -2.0 - t)
     return np.arctan2(s, c)
-
-
-@njit(forceinline=True)
-def packed_wrench(sand, body, xpos, xmat, velocity, omega):
-    """Force [N] and moment about the body's origin [N m] in the world frame, as six numbers."""
-    if is_clear(sand, body, xpos, xmat):
-        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    frame = frame_of(sand, body, xpos, xmat, velocity, omega)
-    medium = medium_of(sand, body)
-    fx = fy = fz = tx = ty = tz = 0.0
-    cx, cy, cz, nx, ny, nz, area = columns(body)
-    for first in range(0, area.size, BLOCK):
-        if block_is_clear(body, first // BLOCK, frame, 0.0):
-            continue
-        last = min(first + BLOCK, area.size)
-        if sand[0] == 0.0:
-            f = kernels.sums_2d(cx, cy, cz, nx, ny, nz, area, first, last, frame, medium)
-        elif sand[0] == 1.0:
-            f = kernels.sums_3d(cx, cy, cz, nx, ny, nz, area, first, last, frame, medium)
-        else:
-            f = kernels.sums_3d_quartic(cx, cy, cz, nx, ny, nz, area, first, last, frame, medium)
-        fx, fy, fz, tx, ty, tz = fx + f[0], fy + f[1], fz + f[2], tx + f[3], ty + f[4], tz + f[5]
-    return to_world(xmat, fx, fy, fz) + to_world(xmat, tx, ty, tz)
-
-
-def _make_tractions(source: str) -> Any:
-    @njit(cache=True)
-    def fill(sand, body, xpos, xmat, velocity, omega, stress_out, depth_out):
-        if not source:
-            return
-        frame = frame_of(sand, body, xpos, xmat, velocity, omega)
-        medium = medium_of(sand, body)
-        cx, cy, cz, nx, ny, nz, _ = columns(body)
-        if sand[0] == 0.0:
-            kernels.tractions_2d(cx, cy, cz, nx, ny, nz, frame, medium, stress_out, depth_out)
-        elif sand[0] == 1.0:
-            kernels.tractions_3d(cx, cy, cz, nx, ny, nz, frame, medium, stress_out, depth_out)
-        else:
-            kernels.tractions_3d_quartic(cx, cy, cz, nx, ny, nz, frame, medium, stress_out, depth_out)
-
-    return fill
-
-
-_fill_tractions = _make_tractions(SOURCE)
-
-
-def tractions(sand: Array, body: Array, xpos: Any, xmat: Any, velocity: Any, omega: Any) -> tuple[Array, Array]:
-    """Each triangle's stress [Pa] in the body frame, (ntri, 3), and effective depth [m], (ntri,)."""
-    ntri = int(body[14])
-    stress, depth = np.empty((ntri, 3)), np.empty(ntri)
-    arguments = (np.ascontiguousarray(x, dtype=float) for x in (sand, body, xpos, xmat, velocity, omega))
-    _fill_tractions(*arguments, stress, depth)
-    return stress, depth

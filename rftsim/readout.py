@@ -5,7 +5,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from rftsim import packed
+from rftsim import native, packed
 from rftsim.engine.instance import BODY_MARKER, SAND_MARKER, read_counters, read_wrenches
 from rftsim.errors import SceneError
 from rftsim.surface import Array
@@ -107,7 +107,7 @@ def tractions(model: mujoco.MjModel, data: mujoco.MjData, body: "int | str") -> 
     surface = bed.bodies[index]
     velocity, omega = body_velocities(model, data)
     rotation = data.xmat[index].reshape(3, 3)
-    stress, depth = packed.tractions(
+    stress, depth = native.tractions(
         bed.sand, surface, data.xpos[index], data.xmat[index], velocity[index], omega[index]
     )
     *columns, area = packed.read_columns(surface)

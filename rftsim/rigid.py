@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rftsim import packed
+from rftsim import native, packed
 from rftsim.laws import Law, get_law
 from rftsim.sand import FreeSurface, Sand
 from rftsim.surface import Array, Surface
@@ -56,7 +56,7 @@ def surface_force(
     bed = packed.pack_sand(sand, get_law(law), free_surface or FreeSurface(), plane)
     rotation, velocity, omega = (np.array(x, dtype=float) for x in (rotation, velocity, angular_velocity))
     pose = np.array(position, dtype=float), rotation.ravel()
-    stress, depth = packed.tractions(bed, packed.pack_surface(surface), *pose, velocity, omega)
+    stress, depth = native.tractions(bed, packed.pack_surface(surface), *pose, velocity, omega)
     force = stress.T @ surface.areas
     moment = np.cross(surface.centres, stress).T @ surface.areas
     force, moment, stress = rotation @ force, rotation @ moment, stress @ rotation.T

@@ -55,7 +55,7 @@ def add_sand(
     allow_open: bool = False,
     sensors: bool = True,
     draw: bool = True,
-    force: Literal["implicit", "explicit"] = "implicit",
+    force: Literal["explicit", "implicit"] = "explicit",
     name: str = "sand",
 ) -> Bed:
     """Put sand under a model that is not compiled yet.
@@ -78,8 +78,9 @@ def add_sand(
         allow_open: Accept meshes that are not closed.
         sensors: Add the sensors.
         draw: Draw the free surface as a translucent plane.
-        force: `implicit`: the force at the end of each step, exact at rest and at long steps; `explicit`: the force at
-            the velocity of the moment. The integrator RK4 always takes the explicit one.
+        force: `explicit`: the sand's force at the velocity of the moment; `implicit`: at the end of each step, which
+            holds at rest and at long steps. It compiles for minutes the first time that it is asked for on a machine,
+            and the integrator RK4 takes the explicit force all the same.
         name: Name of the bed, where a model has several.
 
     Returns:
@@ -88,12 +89,13 @@ def add_sand(
     Raises:
         RftsimError: The scene cannot have sand: unknown bodies, surfaces that bound nothing, flags that would skip it.
     """
-    plugin.register()
-    if force not in ("implicit", "explicit"):
-        raise SceneError(f"force must be 'implicit' or 'explicit', not {force!r}")
+    if force not in ("explicit", "implicit"):
+        raise SceneError(f"force must be 'explicit' or 'implicit', not {force!r}")
+    plugin_name = plugin.IMPLICIT if force == "implicit" else plugin.EXPLICIT
+    plugin.register(plugin_name)
     bed_sand, bed_law = make_sand(sand), get_law(law)
     free_surface = surface if isinstance(surface, FreeSurface) else FreeSurface(height=surface)
-    numbers = packed.pack_sand(bed_sand, bed_law, free_surface, plane, force == "implicit")
+    numbers = packed.pack_sand(bed_sand, bed_law, free_surface, plane)
     _name_bodies(spec)
     model = _compiled(spec)
     _check_options(model, bed_sand)
@@ -103,7 +105,7 @@ def add_sand(
         surfaces |= _with_wheels(model, surfaces, wheels)
     notes = [note for one in surfaces.values() for note in one.notes]
     notes += _floors(spec, model, surfaces, free_surface, disable_floor)
-    _write(spec, name, numbers, surfaces, sensors)
+    _write(spec, plugin_name, name, numbers, surfaces, sensors)
     if draw:
         _draw(spec, name, free_surface)
     for note in notes:
@@ -313,12 +315,14 @@ def _floors(
     return notes
 
 
-def _write(spec: mujoco.MjSpec, name: str, numbers: np.ndarray, surfaces: Mapping[str, Surface], sensors: bool) -> None:
+def _write(
+    spec: mujoco.MjSpec, plugin_name: str, name: str, numbers: Array, surfaces: Mapping[str, Surface], sensors: bool
+) -> None:
     taken = {p.name for p in spec.plugins}
     if name in taken:
         raise SceneError(f"the model has a plugin instance {name!r} already: give this bed another name")
-    spec.activate_plugin(plugin.PLUGIN)
-    instance = spec.add_plugin(name=name, plugin_name=plugin.PLUGIN, active=True)
+    spec.activate_plugin(plugin_name)
+    instance = spec.add_plugin(name=name, plugin_name=plugin_name, active=True)
     spec.add_numeric(name=engine.SAND_MARKER + name, data=numbers, size=numbers.size)
     for body_name, surface in surfaces.items():
         body = spec.body(body_name)
@@ -336,7 +340,7 @@ def _write(spec: mujoco.MjSpec, name: str, numbers: np.ndarray, surfaces: Mappin
 
 
 def _attach(element: Any, instance: Any) -> None:
-    element.name, element.plugin_name, element.active = instance.name, plugin.PLUGIN, True
+    element.name, element.plugin_name, element.active = instance.name, instance.plugin_name, True
 
 
 def _draw(spec: mujoco.MjSpec, name: str, free_surface: FreeSurface) -> None:

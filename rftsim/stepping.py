@@ -5,14 +5,15 @@ Jacobians and normals frozen and only the depths moving; MuJoCo is then handed t
 sub-cycled path ends. MuJoCo's velocity is the mean one of that path; what it lacks to the true one is carried to the
 next step.
 
-What must last from step to step is one array of numbers, `state_size` long; all zero is "nothing known".
+What must last from step to step is one array of numbers, see `state`.
 """
 
 import numpy as np
 from numba import njit
 
-from rftsim import dense, implicit, kernels, packed
+from rftsim import dense, implicit, kernels, native_ahead, packed
 from rftsim.implicit import CONTACT, Rows, Step
+from rftsim.state import DRIFT, HEAD, KNOWS_DERIVATIVE, KNOWS_FORCE, SPLIT, STARTED, part_of
 
 FINENESS = 5e-3
 """Error of the position in a step, over the depth, above which the step is split."""
@@ -23,21 +24,6 @@ GAIN = 1e-4
 """Work that the sand may do in a step over the kinetic energy: rounding, not physics, and more is taken back."""
 FALL = 30.0
 """Acceleration that bodies are watched for on their way to the sand [m/s^2]."""
-
-# entries of the state: flags, then arrays
-_STARTED, _KNOWS_FORCE, _KNOWS_DERIVATIVE, _SPLIT, _DRIFT, _HEAD = 0, 1, 2, 3, 4, 6
-
-
-@njit
-def state_size(nbody, nv):
-    """Numbers that last from step to step."""
-    return _HEAD + 4 * nv + 36 * nbody
-
-
-@njit
-def _part(state, k, nv):
-    """The k-th vector of the state: 0 force foreseen, 1 velocity it belongs to, 2 lack, 3 velocity after the step."""
-    return state[_HEAD + k * nv : _HEAD + (k + 1) * nv]
 
 
 @njit
@@ -50,7 +36,7 @@ def _write(target, origin):
 def _is_near(bodies, v, h):
     """Whether any triangle can be in the sand within the step."""
     for b in range(bodies.length.size):
-        surface = implicit._surface(bodies, b)
+        surface = implicit.surface_of(bodies, b)
         twist = implicit.twist_of(bodies, b, v)
         frame = implicit.frame_at(bodies, b, twist)
         depth = frame.height
@@ -64,7 +50,7 @@ def _is_near(bodies, v, h):
 @njit
 def _deepest(bodies, b, twist, h):
     """Largest depth of a body's triangles, now or after a time h [m]."""
-    surface = implicit._surface(bodies, b)
+    surface = implicit.surface_of(bodies, b)
     cx, cy, cz, _, _, _, area = packed.columns(surface)
     frame = implicit.frame_at(bodies, b, twist)
     found = kernels.deepest(cx, cy, cz, 0, area.size, frame)
@@ -128,11 +114,11 @@ def _force_of(mass, rows, change, h, tau):
 @njit
 def is_needed(old, new, bodies, v, h):
     """Whether the sand can act in the step; where not, the new state is filled."""
-    if old[_SPLIT] > 0.0 or _is_near(bodies, v, h):
+    if old[SPLIT] > 0.0 or _is_near(bodies, v, h):
         return True
     for i in range(new.size):
         new[i] = 0.0
-    new[_STARTED] = 1.0
+    new[STARTED] = 1.0
     return False
 
 
@@ -156,23 +142,23 @@ def sand_force(old, new, bodies, rows, mass, mass_h, v, h, tau, count, wrench):
     nv = v.size
     for i in range(new.size):
         new[i] = 0.0
-    new[_STARTED] = 1.0
+    new[STARTED] = 1.0
     inverse = dense.inverse(mass)
     frames = bodies.frame.copy()
     q = _one_step(old, new, bodies, rows, mass, inverse, mass_h, v, h, tau, MOST_PARTS, count, wrench)
     allowed = GAIN * dense.dot(v, dense.multiply(mass, v)) + 1e-12
     for k in range(nv):
-        allowed += 3.0 * h * implicit.V_C * abs(q[k])
-    if h * dense.dot(q, v + _part(new, 3, nv)) / 2.0 > allowed and (old[_SPLIT] > 0.0 or new[_SPLIT] > 0.0):
+        allowed += 3.0 * h * native_ahead.V_C * abs(q[k])
+    if h * dense.dot(q, v + part_of(new, 3, nv)) / 2.0 > allowed and (old[SPLIT] > 0.0 or new[SPLIT] > 0.0):
         blank = np.zeros(old.size)
-        blank[_STARTED] = 1.0
+        blank[STARTED] = 1.0
         for b in range(frames.shape[0]):
             _write(bodies.frame[b], frames[b])
         q = _one_step(blank, new, bodies, rows, mass, inverse, mass_h, v, h, tau, 1, count, wrench)
-    if h * dense.dot(q, v + _part(new, 3, nv)) / 2.0 > allowed:
+    if h * dense.dot(q, v + part_of(new, 3, nv)) / 2.0 > allowed:
         # the force's own share of the work, and the rest's: scale it until they cancel
         own = h * dense.dot(q, dense.multiply(dense.inverse(mass_h), q)) / 2.0
-        rest = dense.dot(q, v + _part(new, 3, nv)) / 2.0 - own
+        rest = dense.dot(q, v + part_of(new, 3, nv)) / 2.0 - own
         share = 0.0 if rest >= 0.0 else min(1.0, -rest / own)
         q, wrench[:, :] = q * share, wrench * share
     return q
@@ -181,26 +167,26 @@ def sand_force(old, new, bodies, rows, mass, mass_h, v, h, tau, count, wrench):
 @njit
 def _one_step(old, new, bodies, rows, mass, inverse, mass_h, v, h, tau, most_parts, count, wrench):
     nv, nb = v.size, bodies.length.size
-    split_before = old[_SPLIT] > 0.0
-    drift = old[_DRIFT] if split_before else h
-    start = v + _part(old, 2, nv) if split_before else v.copy()
+    split_before = old[SPLIT] > 0.0
+    drift = old[DRIFT] if split_before else h
+    start = v + part_of(old, 2, nv) if split_before else v.copy()
     g = np.empty((nb, 6, 6))
-    _write(g.reshape(36 * nb), old[_HEAD + 4 * nv :])
-    known, foreseen = old[_KNOWS_DERIVATIVE] > 0.0, old[_KNOWS_FORCE] > 0.0
-    last = _part(old, 1, nv).copy() if foreseen else v.copy()
+    _write(g.reshape(36 * nb), old[HEAD + 4 * nv :])
+    known, foreseen = old[KNOWS_DERIVATIVE] > 0.0, old[KNOWS_FORCE] > 0.0
+    last = part_of(old, 1, nv).copy() if foreseen else v.copy()
     rows = _rows_with(rows, inverse, mass_h, rows.stiffness, rows.reference)
     step = Step(bodies, rows, mass_h, dense.inverse(mass_h), start, 0.5 * (drift + h), tau)
-    guess = implicit.predict(step, last, _part(old, 0, nv), g, known)
+    guess = implicit.predict(step, last, part_of(old, 0, nv), g, known)
     point, known, solved = implicit.solve(step, guess, last, g, known, count)
-    parts = min(_parts(step, point, h, old[_STARTED] == 0.0, solved), most_parts)
+    parts = min(_parts(step, point, h, old[STARTED] == 0.0, solved), most_parts)
     if parts == 1:
         count[2] += 0 if solved else 1
-        _write(_part(new, 0, nv), implicit.generalised(bodies, point.wrench, 6))
-        _write(_part(new, 1, nv), point.v)
-        _write(_part(new, 2, nv), np.zeros(nv))
-        _write(_part(new, 3, nv), point.v)
-        _write(new[_HEAD + 4 * nv :], g.reshape(36 * nb))
-        new[_KNOWS_FORCE], new[_KNOWS_DERIVATIVE], new[_SPLIT] = 1.0, 1.0 if known else 0.0, 0.0
+        _write(part_of(new, 0, nv), implicit.generalised(bodies, point.wrench, 6))
+        _write(part_of(new, 1, nv), point.v)
+        _write(part_of(new, 2, nv), np.zeros(nv))
+        _write(part_of(new, 3, nv), point.v)
+        _write(new[HEAD + 4 * nv :], g.reshape(36 * nb))
+        new[KNOWS_FORCE], new[KNOWS_DERIVATIVE], new[SPLIT] = 1.0, 1.0 if known else 0.0, 0.0
         for b in range(nb):
             for k in range(6):
                 wrench[b, k] = point.wrench[b, k]
@@ -230,7 +216,7 @@ def _split_step(old, new, whole, point, mass, inverse, v, h, parts, count, wrenc
     kicked, foreseen, mean, moved = whole.start.copy(), np.zeros(nv), np.zeros(nv), np.zeros(nv)
     g, known = np.zeros((nb, 6, 6)), False
     # a velocity that was set by hand belongs to the start of the step, and MuJoCo's own to half a drift before it
-    drift = old[_DRIFT] if old[_SPLIT] > 0.0 else (h if old[_STARTED] > 0.0 else 0.0)
+    drift = old[DRIFT] if old[SPLIT] > 0.0 else (h if old[STARTED] > 0.0 else 0.0)
     part, done = h / parts, 0.0
     for b in range(nb):
         for k in range(6):
@@ -264,10 +250,10 @@ def _split_step(old, new, whole, point, mass, inverse, v, h, parts, count, wrenc
                 wrench[b, k] += point.wrench[b, k] * (part / h)
         kicked, drift, done = point.v, part, done + part
         part = min(2.0 * part, h / parts)
-    _write(_part(new, 0, nv), foreseen)
-    _write(_part(new, 1, nv), kicked)
-    _write(_part(new, 2, nv), kicked - mean)
-    _write(_part(new, 3, nv), mean)
-    _write(new[_HEAD + 4 * nv :], g.reshape(36 * nb))
-    new[_KNOWS_FORCE], new[_KNOWS_DERIVATIVE], new[_SPLIT], new[_DRIFT] = 1.0, 1.0 if known else 0.0, 1.0, drift
+    _write(part_of(new, 0, nv), foreseen)
+    _write(part_of(new, 1, nv), kicked)
+    _write(part_of(new, 2, nv), kicked - mean)
+    _write(part_of(new, 3, nv), mean)
+    _write(new[HEAD + 4 * nv :], g.reshape(36 * nb))
+    new[KNOWS_FORCE], new[KNOWS_DERIVATIVE], new[SPLIT], new[DRIFT] = 1.0, 1.0 if known else 0.0, 1.0, drift
     return _force_of(mass_h, held, mean - v, h, tau)

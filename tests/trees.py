@@ -25,10 +25,10 @@ def spec_of(bodies=BALL, option="", extra=""):
     return mujoco.MjSpec.from_string(xml(bodies, option, extra))
 
 
-def sandy(mjcf=BALL, option="", sand=SAND, law="rft3d", **options):
-    """A compiled model with sand under it."""
+def sandy(mjcf=BALL, option="", sand=SAND, law="rft3d", force="explicit", **options):
+    """A compiled model with sand under it, whose force is that of the moment."""
     spec = spec_of(mjcf, option)
-    add_sand(spec, sand, law, **options)
+    add_sand(spec, sand, law, force=force, **options)
     return spec.compile()
 
 

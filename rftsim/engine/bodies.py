@@ -48,12 +48,14 @@ def arm(t, body, x):
 
 
 @njit
-def twist(t, body):
-    """Velocity of a body's origin, and its angular velocity."""
+def twist(t, body, velocity_out, omega_out):
+    """Fill the velocity of a body's origin and its angular velocity, (3,) each."""
     c = t.cvel[6 * body : 6 * body + 6]  # MuJoCo's cvel: angular first
     r = arm(t, body, t.xpos[3 * body : 3 * body + 3])
-    v = (c[3] + c[1] * r[2] - c[2] * r[1], c[4] + c[2] * r[0] - c[0] * r[2], c[5] + c[0] * r[1] - c[1] * r[0])
-    return v, (c[0], c[1], c[2])
+    velocity_out[0] = c[3] + c[1] * r[2] - c[2] * r[1]
+    velocity_out[1] = c[4] + c[2] * r[0] - c[0] * r[2]
+    velocity_out[2] = c[5] + c[0] * r[1] - c[1] * r[0]
+    omega_out[0], omega_out[1], omega_out[2] = c[0], c[1], c[2]
 
 
 @njit

@@ -4,26 +4,16 @@ At that moment the mass matrix and the constraints' Jacobians are current, and w
 bias and the constraints' reference are the last step's. They are computed here (MuJoCo does it again, the same).
 """
 
-import ctypes
 from typing import Final
 
-import llvmlite.binding as llvm
 import mujoco
 import numpy as np
-from numba import njit, types
+from numba import njit
 
 from rftsim import implicit as solver
-from rftsim import packed, stepping
-from rftsim.engine import bodies, instance
+from rftsim import native_ahead, stepping
+from rftsim.engine import bodies, external, instance
 from rftsim.memory import doubles, int32s, pointer
-
-EXTERNAL: Final = ("mj_fwdActuation", "mj_rne", "mj_referenceConstraint", "mj_isSparse", "mjd_smooth_vel")
-
-_fwd_actuation = types.ExternalFunction("mj_fwdActuation", types.void(types.intp, types.intp))
-_rne = types.ExternalFunction("mj_rne", types.void(types.intp, types.intp, types.intc, types.intp))
-_reference_constraint = types.ExternalFunction("mj_referenceConstraint", types.void(types.intp, types.intp))
-_is_sparse = types.ExternalFunction("mj_isSparse", types.intc(types.intp))
-_smooth_vel = types.ExternalFunction("mjd_smooth_vel", types.void(types.intp, types.intp, types.intc))
 
 _EULER: Final = int(mujoco.mjtIntegrator.mjINT_EULER)
 _IMPLICIT: Final = int(mujoco.mjtIntegrator.mjINT_IMPLICIT)
@@ -40,12 +30,6 @@ _KIND: Final = {
 }
 _KINDS: Final = tuple(_KIND[key] for key in sorted(_KIND, key=int))
 _ELLIPTIC: Final = int(mujoco.mjtConstraint.mjCNSTR_CONTACT_ELLIPTIC)
-
-
-def link(library: ctypes.CDLL) -> None:
-    """Let compiled code call MuJoCo's functions by name."""
-    for name in EXTERNAL:
-        llvm.add_symbol(name, ctypes.cast(getattr(library, name), ctypes.c_void_p).value)
 
 
 @njit
@@ -76,7 +60,7 @@ def _mass_of_integrator(model, data, m, d, mass, h):
             for i in range(nv):
                 out[i, i] += h * damping[i]
         return out
-    _smooth_vel(m, d, 1 if integrator == _IMPLICIT else 0)
+    external.smooth_vel(m, d, 1 if integrator == _IMPLICIT else 0)
     number = int32s(pointer(m + model.D_rownnz), nv)
     start = int32s(pointer(m + model.D_rowadr), nv)
     total = start[nv - 1] + number[nv - 1]
@@ -96,9 +80,9 @@ def _mass_of_integrator(model, data, m, d, mass, h):
 @njit
 def _driving_force(model, data, m, d, t, nv):
     """All smooth forces of this step but the sand's, (nv,)."""
-    _fwd_actuation(m, d)
+    external.fwd_actuation(m, d)
     bias = pointer(d + data.qfrc_bias)
-    _rne(m, d, 0, bias)
+    external.rne(m, d, 0, bias)
     out = np.empty(nv)
     passive, actuator = doubles(pointer(d + data.qfrc_passive), nv), doubles(pointer(d + data.qfrc_actuator), nv)
     applied, weight = doubles(pointer(d + data.qfrc_applied), nv), doubles(bias, nv)
@@ -125,11 +109,11 @@ def _constraints(model, data, m, d, nv):
     stiffness, reference, bound = np.zeros(n), np.zeros(n), np.zeros(n)
     damping, spring = np.zeros(n), np.zeros(n)
     if n > 0:
-        _reference_constraint(m, d)
+        external.reference_constraint(m, d)
         kinds, owner = int32s(pointer(d + data.efc_type), n), int32s(pointer(d + data.efc_id), n)
         d_, aref = doubles(pointer(d + data.efc_D), n), doubles(pointer(d + data.efc_aref), n)
         loss, kbip = doubles(pointer(d + data.efc_frictionloss), n), doubles(pointer(d + data.efc_KBIP), 4 * n)
-        if _is_sparse(m):
+        if external.is_sparse(m):
             number = int32s(pointer(d + data.efc_J_rownnz), n)
             start = int32s(pointer(d + data.efc_J_rowadr), n)
             total = start[n - 1] + number[n - 1]
@@ -156,7 +140,8 @@ def _bodies_of(model, m, t, table, sand, nv):
     """The bodies of the instance, for one step."""
     n = table[0]
     jacobian, rotation = np.empty((n, 6, nv)), np.empty((n, 9))
-    frame, length, surface = np.empty((n, solver.FRAME)), np.empty(n), np.empty((n, 2), np.int64)
+    frame, length, surface = np.empty((n, native_ahead.FRAME)), np.empty(n), np.empty((n, 2), np.int64)
+    v, w = np.empty(3), np.empty(3)
     for k in range(n):
         body, field = table[instance.HEAD + 2 * k], table[instance.HEAD + 2 * k + 1]
         numbers = instance.numeric(model, m, field)
@@ -169,9 +154,10 @@ def _bodies_of(model, m, t, table, sand, nv):
         bodies.jacobian(t, body, jacobian[k])
         for i in range(9):
             rotation[k, i] = t.xmat[9 * body + i]
-        v, w = bodies.twist(t, body)
-        x = t.xpos[3 * body : 3 * body + 3]
-        solver.keep_frame(packed.frame_of(sand, numbers, x, rotation[k], v, w), frame[k])
+        x = t.xpos[3 * body : 3 * body + 3].ctypes.data
+        bodies.twist(t, body, v, w)
+        r, f = rotation[k].ctypes.data, frame[k].ctypes.data
+        native_ahead.frame(sand.ctypes.data, surface[k, 0], x, r, v.ctypes.data, w.ctypes.data, f)
     return solver.Bodies(jacobian, rotation, frame, length, surface, sand)
 
 

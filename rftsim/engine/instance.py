@@ -13,7 +13,7 @@ from typing import Final
 
 from numba import njit
 
-from rftsim import stepping
+from rftsim import state
 from rftsim.memory import allocate, characters, doubles, int32s, int64s, pointer, release
 
 BODY_MARKER: Final = "rftsim-body:"
@@ -80,9 +80,15 @@ def count_bodies(model, m, instance):
 
 
 @njit
+def wanted_state(model, m, instance):
+    """Numbers of plugin_state that the implicit force wants."""
+    return state.state_size(count_bodies(model, m, instance), pointer(m + model.nv))
+
+
+@njit
 def state_size(model, m, instance):
-    """Numbers that last from step to step."""
-    return stepping.state_size(count_bodies(model, m, instance), pointer(m + model.nv))
+    """Numbers of plugin_state that the instance has."""
+    return int32s(pointer(m + model.plugin_statenum), pointer(m + model.nplugin))[instance]
 
 
 @njit
@@ -178,10 +184,10 @@ def forget(address):
 def keep(model, data, m, d, instance):
     """End a step: what it left pending lasts, and its work is counted."""
     address = slot(data, d, instance)[0]
-    state = lasting(model, data, m, d, instance)
-    waiting = pending(address, state.size)
-    for i in range(state.size):
-        state[i] = waiting[i]
+    now = lasting(model, data, m, d, instance)
+    waiting = pending(address, now.size)
+    for i in range(now.size):
+        now[i] = waiting[i]
     counted = counters(address)
     counted[3] += 1.0
     for k in range(3):

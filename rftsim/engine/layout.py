@@ -59,6 +59,7 @@ class Model(NamedTuple):
     name_numericadr: int
     name_pluginadr: int
     plugin_stateadr: int
+    plugin_statenum: int
     M_rownnz: int
     M_rowadr: int
     M_colind: int
@@ -160,7 +161,7 @@ def layout() -> tuple[Model, Data]:
 def _offset(struct: type[ctypes.Structure], name: str) -> int:
     """Offset of a field, or of `opt_x`, a field of the options."""
     if name.startswith("opt_"):
-        return struct.opt.offset + getattr(_struct("mjOption"), name[4:]).offset  # type: ignore[no-any-return,attr-defined]
+        return struct.opt.offset + getattr(_struct("mjOption"), name[4:]).offset  # type: ignore[no-any-return]
     return getattr(struct, name).offset  # type: ignore[no-any-return]
 
 

@@ -13,23 +13,16 @@ import mujoco
 from numba import cfunc, njit, types
 
 from rftsim.compiled import SOURCE
-from rftsim.engine import explicit, implicit, instance, layout
+from rftsim.engine import explicit, instance, layout
+from rftsim.engine.external import link
 from rftsim.memory import doubles, int32s, pointer, release
 
-PLUGIN: Final = "rftsim.sand"
-_IMPLICIT: Final = 16  # of the packed sand
+EXPLICIT: Final = "rftsim.sand"
+IMPLICIT: Final = "rftsim.sand.implicit"
+"""The two plugins: the force at the velocity of the moment, and the one at the end of the step."""
+
 _RK4: Final = int(mujoco.mjtIntegrator.mjINT_RK4)
 _PASSIVE: Final = int(mujoco.mjtPluginCapabilityBit.mjPLUGIN_PASSIVE)
-
-
-@njit
-def _press(model, data, m, d, number):
-    table = instance.table(instance.slot(data, d, number)[0])
-    wanted = instance.numeric(model, m, table[1])[_IMPLICIT] != 0.0
-    if wanted and int32s(m + model.opt_integrator, 1)[0] != _RK4:
-        implicit.press(model, data, m, d, number)
-    else:
-        explicit.press(model, data, m, d, number)
 
 
 @njit
@@ -51,16 +44,12 @@ def _sense(model, data, m, d, number):
                     out[i] = wrenches[instance.WRENCH * k + i]
 
 
-def _make(model: layout.Model, data: layout.Data, source: str) -> dict[str, Any]:
-    """The callbacks by name, for one layout of MuJoCo's structs.
+def _make(model: layout.Model, data: layout.Data, source: str) -> tuple[Any, ...]:
+    """The callbacks that both plugins have, for one layout of MuJoCo's structs.
 
     `source` identifies the code that they compile from. Numba's cache distinguishes functions by what they close over,
     and does not see the functions that they call; so each callback closes over it.
     """
-
-    @cfunc(types.intc(types.intp, types.intc), cache=True)
-    def nstate(m, number):
-        return instance.state_size(model, m, number) if source else -1
 
     @cfunc(types.intc(types.intp, types.intc, types.intc), cache=True)
     def nsensordata(m, number, sensor):
@@ -90,20 +79,46 @@ def _make(model: layout.Model, data: layout.Data, source: str) -> dict[str, Any]
             for i in range(lasting.size):
                 lasting[i] = 0.0
 
-    @cfunc(types.void(types.intp, types.intp, types.intc, types.intc), cache=True)
-    def compute(m, d, number, capability):
-        if source and capability == _PASSIVE:
-            _press(model, data, m, d, number)
-        else:
-            _sense(model, data, m, d, number)
-
     @cfunc(types.void(types.intp, types.intp, types.intc), cache=True)
     def advance(m, d, number):
         if source:
             instance.keep(model, data, m, d, number)
 
-    callbacks = (nstate, nsensordata, init, destroy, copy, reset, compute, advance)
-    return {callback.__name__: callback for callback in callbacks}
+    return nsensordata, init, destroy, copy, reset, advance
+
+
+def _make_explicit(model: layout.Model, data: layout.Data, source: str) -> tuple[Any, ...]:
+    @cfunc(types.intc(types.intp, types.intc), cache=True)
+    def nstate(m, number):
+        return min(len(source), 0)
+
+    @cfunc(types.void(types.intp, types.intp, types.intc, types.intc), cache=True)
+    def compute(m, d, number, capability):
+        if source and capability == _PASSIVE:
+            explicit.press(model, data, m, d, number)
+        else:
+            _sense(model, data, m, d, number)
+
+    return nstate, compute
+
+
+def _make_implicit(model: layout.Model, data: layout.Data, source: str) -> tuple[Any, ...]:
+    from rftsim.engine import implicit  # compiles for minutes where it is not cached
+
+    @cfunc(types.intc(types.intp, types.intc), cache=True)
+    def nstate(m, number):
+        return instance.wanted_state(model, m, number) if source else 0
+
+    @cfunc(types.void(types.intp, types.intp, types.intc, types.intc), cache=True)
+    def compute(m, d, number, capability):
+        if not source or capability != _PASSIVE:
+            _sense(model, data, m, d, number)
+        elif int32s(m + model.opt_integrator, 1)[0] == _RK4:
+            explicit.press(model, data, m, d, number)
+        else:
+            implicit.press(model, data, m, d, number)
+
+    return nstate, compute
 
 
 class _Plugin(ctypes.Structure):
@@ -139,8 +154,8 @@ _keep: list[Any] = []  # MuJoCo holds addresses of what is here, so it is never 
 
 
 @functools.cache
-def register() -> int:
-    """Register the plugin with MuJoCo, once in a process.
+def register(name: str = EXPLICIT) -> int:
+    """Register one of the plugins with MuJoCo, once in a process.
 
     Returns:
         The plugin's slot.
@@ -154,16 +169,17 @@ def register() -> int:
     library.mjp_defaultPlugin(memory)
     if memory.raw[:size].strip(b"\0") or memory.raw[size : size + 8] != b"\xff" * 8:
         raise layout.LayoutError(f"MuJoCo {mujoco.__version__} has another mjpPlugin; rftsim needs mujoco>=3.17,<4")
-    implicit.link(library)
-    callbacks = _make(*layout.layout(), SOURCE)
+    link(library)
+    make_compute = {EXPLICIT: _make_explicit, IMPLICIT: _make_implicit}[name]
+    offsets = layout.layout()
+    callbacks = (*_make(*offsets, SOURCE), *make_compute(*offsets, SOURCE))
     plugin = _Plugin.from_buffer(memory)
-    plugin.name = PLUGIN.encode()
-    plugin.capabilityflags = (
-        mujoco.mjtPluginCapabilityBit.mjPLUGIN_PASSIVE | mujoco.mjtPluginCapabilityBit.mjPLUGIN_SENSOR
-    )
+    plugin.name = name.encode()
+    bits = mujoco.mjtPluginCapabilityBit
+    plugin.capabilityflags = bits.mjPLUGIN_PASSIVE | bits.mjPLUGIN_SENSOR
     plugin.needstage = mujoco.mjtStage.mjSTAGE_VEL
-    for name, callback in callbacks.items():
-        setattr(plugin, name, callback.address)
-    _keep.extend([plugin, callbacks])
+    for callback in callbacks:
+        setattr(plugin, callback.__name__, callback.address)
+    _keep.append((plugin, callbacks))
     ctypes.pythonapi.Py_IncRef(ctypes.py_object(_keep))  # mjData may be freed after this module at exit
     return int(library.mjp_registerPlugin(ctypes.byref(plugin)))

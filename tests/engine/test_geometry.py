@@ -89,7 +89,7 @@ def test_wheel_from_its_hinge():
 def test_wheel_by_its_measures():
     """A Wheel may be given; in the compiled model the sand falls behind it, section 4.6.2."""
     spec = spec_of(WHEEL)
-    add_sand(spec, SAND, "drft3d", wheels={"wheel": Wheel((0, 1, 0), (0, 0.02, 0), 0.1)})
+    add_sand(spec, SAND, "drft3d", wheels={"wheel": Wheel((0, 1, 0), (0, 0.02, 0), 0.1)}, force="explicit")
     model = spec.compile()
     data = mujoco.MjData(model)
     data.qvel[6] = 6.0
@@ -142,10 +142,13 @@ def test_faces_that_a_planar_law_never_feels_are_left_out():
     np.testing.assert_allclose(*forces, rtol=1e-9)
 
 
-@pytest.mark.xfail(strict=True, raises=ValueError, reason="3D laws too are asked for a plane along the slope")
 def test_slopes_across_the_default_plane():
-    """A 3D law needs no plane of motion, so the surface may tilt any way."""
-    bed_of(BALL, surface=FreeSurface(normal=(0.0, 0.2, 1.0)))
+    """A 3D law needs no plane of motion, so the surface may tilt any way; a planar law needs one along the slope."""
+    slope = FreeSurface(normal=(0.0, 0.2, 1.0))
+    bed_of(BALL, surface=slope)
+    bed_of(BALL, law="rft2d", surface=slope, plane=(1, 0, 0))
+    with pytest.raises(ValueError, match="plane of motion"):
+        bed_of(BALL, law="rft2d", surface=slope)
 
 
 def test_planes_may_be_turned():
