@@ -154,7 +154,7 @@ _keep: list[Any] = []  # MuJoCo holds addresses of what is here, so it is never 
 
 
 @functools.cache
-def register(name: str = EXPLICIT) -> int:
+def register(name: str) -> int:
     """Register one of the plugins with MuJoCo, once in a process.
 
     Returns:
