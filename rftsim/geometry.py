@@ -51,7 +51,8 @@ def is_colliding(model: mujoco.MjModel, geom: int) -> bool:
 def geom_label(model: mujoco.MjModel, geom: int) -> str:
     """How messages name a geom."""
     body = model.body(model.geom_bodyid[geom]).name
-    return f"geom {model.geom(geom).name or geom} of body {body or model.geom_bodyid[geom]}"
+    name = model.geom(geom).name.partition("rftsim-geom:")[0]
+    return f"geom {name or geom} of body {body or model.geom_bodyid[geom]}"
 
 
 def geom_triangles(model: mujoco.MjModel, geom: int) -> tuple[Array, Faces]:

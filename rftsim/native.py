@@ -29,9 +29,7 @@ wrench = types.ExternalFunction("rftsim_wrench", _signatures["rftsim_wrench"])
 @njit(forceinline=True)
 def surface_at(address):
     """The packed surface at an address."""
-    n = int(doubles(address, packed.HEADER)[14])
-    blocks = (n + kernels.BLOCK - 1) // kernels.BLOCK
-    return doubles(address, packed.HEADER + packed.COLUMNS * n + 4 * blocks)
+    return doubles(address, packed.size_of(doubles(address, packed.HEADER)))
 
 
 def _make(source: str) -> dict[str, Any]:

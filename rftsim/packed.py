@@ -76,6 +76,13 @@ def _spheres(surface: Surface) -> Array:
     return np.column_stack([centres, radii])
 
 
+@njit(forceinline=True)
+def size_of(header):
+    """Numbers of the packed surface that starts with a header."""
+    n = int(header[14])
+    return HEADER + COLUMNS * n + 4 * ((n + BLOCK - 1) // BLOCK)
+
+
 def read_columns(body: Array) -> tuple[Array, ...]:
     """The columns of a packed surface: centre (3), normal (3), area; views, each (ntri,)."""
     n = int(body[14])

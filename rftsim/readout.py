@@ -58,7 +58,7 @@ def instances(model: mujoco.MjModel) -> list[Instance]:
     for body in np.flatnonzero(model.body_plugin >= 0):
         numeric = _marked(by_name, BODY_MARKER, model.body(int(body)).name)
         if numeric is not None:
-            found.setdefault(int(model.body_plugin[body]), {})[int(body)] = _numeric(model, numeric)
+            found.setdefault(int(model.body_plugin[body]), {})[int(body)] = _surface(model, numeric)
     beds = []
     for instance, bodies in found.items():
         name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_PLUGIN, instance)
@@ -82,11 +82,19 @@ def _numeric(model: mujoco.MjModel, i: int) -> Array:
     return view
 
 
+def _surface(model: mujoco.MjModel, i: int) -> Array:
+    """A packed surface, which goes on behind its first numeric."""
+    start = int(model.numeric_adr[i])
+    header = model.numeric_data[start : start + packed.HEADER]
+    view: Array = model.numeric_data[start : start + packed.size_of(header)]
+    return view
+
+
 def wrenches(model: mujoco.MjModel, data: mujoco.MjData) -> Wrenches:
     """Force and moment of the sand on each body, as applied in the last mj_forward or mj_step of `data`."""
     force, moment = np.zeros((model.nbody, 3)), np.zeros((model.nbody, 3))
     for bed in instances(model):
-        for body, wrench in read_wrenches(int(data.plugin_data[bed.id])):
+        for body, wrench in read_wrenches(int(data.plugin_data[bed.id]), data._address, bed.id):
             force[body], moment[body] = wrench[:3], wrench[3:]
     velocity, omega = body_velocities(model, data)
     return Wrenches(force, moment, np.einsum("ij,ij->i", force, velocity) + np.einsum("ij,ij->i", moment, omega))
@@ -145,6 +153,6 @@ def work(model: mujoco.MjModel, data: mujoco.MjData) -> Work:
     """The cost of the sand so far, summed over the beds."""
     totals = np.zeros(4, dtype=int)
     for bed in instances(model):
-        totals += np.array(read_counters(int(data.plugin_data[bed.id])), dtype=int)
+        totals += np.array(read_counters(int(data.plugin_data[bed.id]), data._address, bed.id), dtype=int)
     steps, *costs = totals.tolist()
     return Work(steps, *costs)

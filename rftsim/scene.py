@@ -16,7 +16,7 @@ from rftsim import packed
 from rftsim.engine import instance as engine
 from rftsim.engine import plugin
 from rftsim.errors import RftsimWarning, SceneError
-from rftsim.geometry import body_surface, geom_label, is_colliding
+from rftsim.geometry import body_surface, is_colliding
 from rftsim.laws import Law, get_law
 from rftsim.sand import FreeSurface, Sand, make_sand
 from rftsim.surface import Array, Surface, Wheel
@@ -96,15 +96,29 @@ def add_sand(
     bed_sand, bed_law = make_sand(sand), get_law(law)
     free_surface = surface if isinstance(surface, FreeSurface) else FreeSurface(height=surface)
     numbers = packed.pack_sand(bed_sand, bed_law, free_surface, plane)
-    _name_bodies(spec)
-    model = _compiled(spec)
+    if name in {instance.name for instance in spec.plugins}:
+        raise SceneError(f"the model has a plugin instance {name!r} already: give this bed another name")
+    draft = spec.copy()  # what is checked; the spec itself stays as it is until all is well
+    names = _name_elements(draft)
+    model = draft.compile()
     _check_options(model, bed_sand)
     plane_normal = numbers[7:10] if bed_law.planar else None
     surfaces, reasons = _surfaces(model, bodies, geoms == "collision", max_edge, allow_open, plane_normal)
     if bed_law.dynamic:
         surfaces |= _with_wheels(model, surfaces, wheels)
     notes = [note for one in surfaces.values() for note in one.notes]
-    notes += _floors(spec, model, surfaces, free_surface, disable_floor)
+    floors = _floors(model, surfaces, free_surface)
+    for body, body_name in zip(spec.bodies, names, strict=True):
+        body.name = body_name
+    for geom, depth in floors.items():
+        if disable_floor:
+            element = spec.geoms[int(geom.rpartition(_TEMPORARY)[2])]
+            element.contype = element.conaffinity = 0
+        else:
+            notes.append(
+                f"{_shown(geom)} lies {depth:.3g} m below the sand's surface and collides: it supports the bodies a "
+                "second time. Take its collision away (disable_floor=True) or lower it"
+            )
     _write(spec, plugin_name, name, numbers, surfaces, sensors)
     if draw:
         _draw(spec, name, free_surface)
@@ -149,17 +163,24 @@ def read_spec(source: "str | Path") -> mujoco.MjSpec:
     return mujoco.MjSpec.from_file(str(source))
 
 
-def _compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
-    """The spec's model, from a copy so that the spec stays uncompiled."""
-    return spec.copy().compile()
+_TEMPORARY = "rftsim-geom:"
 
 
-def _name_bodies(spec: mujoco.MjSpec) -> None:
-    taken = {body.name for body in spec.bodies}
-    for number, body in enumerate(spec.bodies):
+def _name_elements(draft: mujoco.MjSpec) -> list[str]:
+    """Name the bodies that have no name, and mark each geom with its place in the spec; the bodies' names."""
+    taken = {body.name for body in draft.bodies}
+    for number, body in enumerate(draft.bodies):
         if not body.name:
             body.name = next(n for k in range(len(taken) + 1) if (n := f"body{number + k}") not in taken)
             taken.add(body.name)
+    for number, geom in enumerate(draft.geoms):
+        geom.name = f"{geom.name}{_TEMPORARY}{number}"
+    return [body.name for body in draft.bodies]
+
+
+def _shown(geom: str) -> str:
+    name, _, number = geom.rpartition(_TEMPORARY)
+    return f"geom {name or number}"
 
 
 def _check_options(model: mujoco.MjModel, sand: Sand) -> None:
@@ -284,43 +305,25 @@ def _hinged_wheel(model: mujoco.MjModel, name: str, surface: Surface) -> Wheel:
     raise SceneError(f"wheel {name!r} has no hinge to turn about: give its Wheel(axis, centre, radius)")
 
 
-def _floors(
-    spec: mujoco.MjSpec,
-    model: mujoco.MjModel,
-    surfaces: Mapping[str, Surface],
-    free_surface: FreeSurface,
-    disable: bool,
-) -> list[str]:
-    """Find planes that would support the bodies a second time; take their collision where asked, else say so."""
+def _floors(model: mujoco.MjModel, surfaces: Mapping[str, Surface], free_surface: FreeSurface) -> dict[str, float]:
+    """Planes and height fields that would support the bodies a second time, and how deep they lie [m]."""
     reach = max(surface.size for surface in surfaces.values())
-    normal = np.array(free_surface.normal)
-    notes = []
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    found = {}
     for geom in range(model.ngeom):
         kind = _GEOM(model.geom_type[geom])
         if kind not in (_GEOM.mjGEOM_PLANE, _GEOM.mjGEOM_HFIELD) or not is_colliding(model, geom):
             continue
-        if model.body_weldid[model.geom_bodyid[geom]] != 0:
-            continue
-        depth = free_surface.offset - normal @ model.geom_pos[geom]
-        if depth > reach:
-            continue
-        if disable:
-            element = spec.geoms[geom]
-            element.contype = element.conaffinity = 0
-        else:
-            notes.append(
-                f"{geom_label(model, geom)} lies {depth:.3g} m below the sand's surface and collides: it supports the "
-                "bodies a second time. Take its collision away (disable_floor=True) or lower it"
-            )
-    return notes
+        depth = float(free_surface.offset - np.dot(free_surface.normal, data.geom_xpos[geom]))
+        if model.body_weldid[model.geom_bodyid[geom]] == 0 and depth <= reach:
+            found[model.geom(geom).name] = depth
+    return found
 
 
 def _write(
     spec: mujoco.MjSpec, plugin_name: str, name: str, numbers: Array, surfaces: Mapping[str, Surface], sensors: bool
 ) -> None:
-    taken = {p.name for p in spec.plugins}
-    if name in taken:
-        raise SceneError(f"the model has a plugin instance {name!r} already: give this bed another name")
     spec.activate_plugin(plugin_name)
     instance = spec.add_plugin(name=name, plugin_name=plugin_name, active=True)
     spec.add_numeric(name=engine.SAND_MARKER + name, data=numbers, size=numbers.size)
@@ -328,7 +331,10 @@ def _write(
         body = spec.body(body_name)
         _attach(body.plugin, instance)
         data = packed.pack_surface(surface)
-        spec.add_numeric(name=engine.BODY_MARKER + body_name, data=data, size=data.size)
+        for first in range(0, data.size, engine.CHUNK):
+            chunk = data[first : first + engine.CHUNK]
+            more = f"{first // engine.CHUNK}-" if first else ""
+            spec.add_numeric(name=more + engine.BODY_MARKER + body_name, data=chunk, size=chunk.size)
         if sensors:
             sensor = spec.add_sensor(
                 name=f"{body_name}_sand",

@@ -11,7 +11,7 @@ from rftsim.memory import doubles, pointer
 @njit
 def press(model, data, m, d, number):
     """Evaluate the sand on every body of the instance and add it to qfrc_passive."""
-    address = instance.slot(data, d, number)[0]
+    address = instance.block_of(model, data, m, d, number)
     table, wrenches = instance.table(address), instance.wrenches(address)
     sand = instance.numeric(model, m, table[1])
     t = bodies.tree(model, data, m, d)

@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 
 from rftsim import implicit as solver
-from rftsim import native_ahead, stepping
+from rftsim import native_ahead, packed, stepping
 from rftsim.engine import bodies, external, instance
 from rftsim.memory import doubles, int32s, pointer
 
@@ -149,7 +149,7 @@ def _bodies_of(model, m, t, table, sand, nv):
             pointer(m + model.numeric_data)
             + instance.SIZE * (int32s(pointer(m + model.numeric_adr), pointer(m + model.nnumeric))[field])
         )
-        surface[k, 1] = numbers.size
+        surface[k, 1] = packed.size_of(numbers)
         length[k] = numbers[15]
         bodies.jacobian(t, body, jacobian[k])
         for i in range(9):
@@ -164,7 +164,7 @@ def _bodies_of(model, m, t, table, sand, nv):
 @njit
 def press(model, data, m, d, number):
     """Solve for the sand's force at the end of the step and add it to qfrc_passive."""
-    address = instance.slot(data, d, number)[0]
+    address = instance.block_of(model, data, m, d, number)
     table = instance.table(address)
     sand = instance.numeric(model, m, table[1])
     nv = pointer(m + model.nv)

@@ -3,9 +3,9 @@
 The numbers are found by name. A numeric is a body's surface, or a bed's parameters, where its name without the marker
 is the body's, or the instance's, name; so MJCF attachment may put any prefix and suffix around both.
 
-What hangs on mjData (`plugin_data`) is one block: int64 [number of bodies, numeric of the bed, (body, numeric of its
-surface) ...], then float64 [last wrench of each body (6), counters (COUNTERS), state after the step under way]. What
-must last is MuJoCo's `plugin_state`, and is brought up to date only when a step ends.
+What belongs to an mjData (its `plugin_data` is a number of the registry) is one block: int64 [number of bodies, numeric
+of the bed, (body, numeric of its surface) ...], then float64 [last wrench of each body (6), counters (COUNTERS), state
+after the step under way]. What must last is MuJoCo's `plugin_state`, and is brought up to date only when a step ends.
 """
 
 import ctypes
@@ -13,9 +13,11 @@ from typing import Final
 
 from numba import njit
 
-from rftsim import state
-from rftsim.memory import allocate, characters, doubles, int32s, int64s, pointer, release
+from rftsim import registry, state
+from rftsim.memory import characters, doubles, int32s, int64s, pointer
 
+CHUNK: Final = 500
+"""Numbers of one numeric: MuJoCo's XML reader takes no more. A surface goes on in the numerics that follow its first."""
 BODY_MARKER: Final = "rftsim-body:"
 SAND_MARKER: Final = "rftsim-sand:"
 WRENCH: Final = 6
@@ -92,9 +94,21 @@ def state_size(model, m, instance):
 
 
 @njit
-def slot(data, d, instance):
-    """Where mjData keeps the address of an instance's block, (1,)."""
+def _slot(data, d, instance):
+    """Where mjData keeps the number of an instance's block, (1,)."""
     return int64s(pointer(d + data.plugin_data) + SIZE * instance, 1)
+
+
+@njit
+def block_of(model, data, m, d, instance):
+    """The address of an instance's block; made anew where mjData lost it, as it does when it is pickled."""
+    slot = _slot(data, d, instance)
+    number = registry.find(slot[0], d, instance)
+    if number < 0:
+        initialise(model, data, m, d, instance)
+    elif number != slot[0]:
+        slot[0] = number
+    return registry.address(slot[0])
 
 
 @njit
@@ -139,10 +153,15 @@ def initialise(model, data, m, d, instance):
     plugins = int32s(pointer(m + model.body_plugin), nbody)
     names = int32s(pointer(m + model.name_bodyadr), nbody)
     instances = int32s(pointer(m + model.name_pluginadr), pointer(m + model.nplugin))
-    address = allocate(HEAD + (2 + WRENCH) * n + COUNTERS + state_size(model, m, instance), SIZE)
-    if address == 0:
+    words = HEAD + (2 + WRENCH) * n + COUNTERS + state_size(model, m, instance)
+    number = registry.make(-1, d, instance, words)
+    if number < 0:
         return -1
-    int64s(address, 1)[0] = n
+    address = registry.address(number)
+    blank = int64s(address, words)
+    for i in range(words):
+        blank[i] = 0
+    blank[0] = n
     entries = table(address)
     entries[1] = _find_numeric(model, m, _SAND_MARKER, instances[instance])
     complete = entries[1] >= 0
@@ -154,22 +173,30 @@ def initialise(model, data, m, d, instance):
             complete = complete and entries[k + 1] >= 0
             k += 2
     if not complete:
-        release(address)
+        registry.drop(number)
         return -1
-    slot(data, d, instance)[0] = address
+    _slot(data, d, instance)[0] = number
     return 0
 
 
 @njit
+def destroy(data, d, instance):
+    """Release the block of an instance."""
+    number = registry.find(_slot(data, d, instance)[0], d, instance)
+    if number >= 0:
+        registry.drop(number)
+
+
+@njit
 def copy(model, data, target, m, origin, instance):
-    """Give another mjData a copy of the block; what it had is released."""
-    address = slot(data, origin, instance)[0]
-    size = HEAD + (2 + WRENCH) * pointer(address) + COUNTERS + state_size(model, m, instance)
-    block, copied = int64s(address, size), allocate(size, SIZE)
-    fresh = int64s(copied, size)
+    """Give another mjData a copy of the block."""
+    size = HEAD + (2 + WRENCH) * count_bodies(model, m, instance) + COUNTERS + state_size(model, m, instance)
+    block = int64s(block_of(model, data, m, origin, instance), size)
+    number = registry.make(_slot(data, target, instance)[0], target, instance, size)
+    fresh = int64s(registry.address(number), size)
     for i in range(size):
         fresh[i] = block[i]
-    slot(data, target, instance)[0] = copied
+    _slot(data, target, instance)[0] = number
 
 
 @njit
@@ -183,7 +210,7 @@ def forget(address):
 @njit
 def keep(model, data, m, d, instance):
     """End a step: what it left pending lasts, and its work is counted."""
-    address = slot(data, d, instance)[0]
+    address = block_of(model, data, m, d, instance)
     now = lasting(model, data, m, d, instance)
     waiting = pending(address, now.size)
     for i in range(now.size):
@@ -194,19 +221,22 @@ def keep(model, data, m, d, instance):
         counted[4 + k] += counted[k]
 
 
-def read_wrenches(address: int) -> list[tuple[int, tuple[float, ...]]]:
-    """Each body's id and last wrench, from the block at `address`."""
-    n, entries, numbers = _read(address)
+def read_wrenches(number: int, owner: int, instance: int) -> list[tuple[int, tuple[float, ...]]]:
+    """Each body's id and last wrench, of the mjData at `owner` whose plugin data is `number`."""
+    n, entries, numbers = _read(number, owner, instance)
     return [(entries[HEAD + 2 * k], tuple(numbers[WRENCH * k : WRENCH * (k + 1)])) for k in range(n)]
 
 
-def read_counters(address: int) -> tuple[float, ...]:
-    """Steps, evaluations, Jacobians and unsolved equations since the last reset, from the block at `address`."""
-    n, _, numbers = _read(address)
+def read_counters(number: int, owner: int, instance: int) -> tuple[float, ...]:
+    """Steps, evaluations, Jacobians and unsolved equations since the last reset."""
+    n, _, numbers = _read(number, owner, instance)
     return tuple(numbers[WRENCH * n + 3 : WRENCH * n + COUNTERS])
 
 
-def _read(address: int) -> "tuple[int, ctypes.Array[ctypes.c_int64], ctypes.Array[ctypes.c_double]]":
+def _read(
+    number: int, owner: int, instance: int
+) -> "tuple[int, ctypes.Array[ctypes.c_int64], ctypes.Array[ctypes.c_double]]":
+    address = registry.read_address(number, owner, instance)
     n = ctypes.c_int64.from_address(address).value
     entries = (ctypes.c_int64 * (HEAD + 2 * n)).from_address(address)
     return n, entries, (ctypes.c_double * (WRENCH * n + COUNTERS)).from_address(address + ctypes.sizeof(entries))

@@ -12,10 +12,11 @@ from typing import Any, Final
 import mujoco
 from numba import cfunc, njit, types
 
+from rftsim import registry
 from rftsim.compiled import SOURCE
 from rftsim.engine import explicit, instance, layout
 from rftsim.engine.external import link
-from rftsim.memory import doubles, int32s, pointer, release
+from rftsim.memory import doubles, int32s, pointer
 
 EXPLICIT: Final = "rftsim.sand"
 IMPLICIT: Final = "rftsim.sand.implicit"
@@ -28,7 +29,7 @@ _PASSIVE: Final = int(mujoco.mjtPluginCapabilityBit.mjPLUGIN_PASSIVE)
 @njit
 def _sense(model, data, m, d, number):
     """Copy each body's wrench to the sensors that name it."""
-    address = instance.slot(data, d, number)[0]
+    address = instance.block_of(model, data, m, d, number)
     table, wrenches = instance.table(address), instance.wrenches(address)
     nsensor = pointer(m + model.nsensor)
     plugins = int32s(pointer(m + model.sensor_plugin), nsensor)
@@ -61,10 +62,8 @@ def _make(model: layout.Model, data: layout.Data, source: str) -> tuple[Any, ...
 
     @cfunc(types.void(types.intp, types.intc), cache=True)
     def destroy(d, number):
-        slot = instance.slot(data, d, number)
         if source:
-            release(slot[0])
-        slot[0] = 0
+            instance.destroy(data, d, number)
 
     @cfunc(types.void(types.intp, types.intp, types.intp, types.intc), cache=True)
     def copy(target, m, origin, number):
@@ -74,7 +73,9 @@ def _make(model: layout.Model, data: layout.Data, source: str) -> tuple[Any, ...
     @cfunc(types.void(types.intp, types.intp, types.intp, types.intc), cache=True)
     def reset(m, state, memory, number):
         if source:
-            instance.forget(memory)
+            block = registry.address(memory) if 0 <= memory < registry.SIZE else 0
+            if block != 0:
+                instance.forget(block)
             lasting = doubles(state, instance.state_size(model, m, number))
             for i in range(lasting.size):
                 lasting[i] = 0.0

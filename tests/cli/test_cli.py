@@ -62,7 +62,7 @@ def test_force_scales_with_length_cubed(capsys, sphere):
         (("--sand", "missing.toml"), "cannot read"),
         (("--law", "rft4d"), "laws are rft2d"),
         (("--scale", "-1"), "scale must be positive"),
-        (("--plane", "0", "0", "1"), "horizontal"),
+        (("--law", "rft2d", "--plane", "0", "0", "1"), "horizontal"),
     ],
 )
 def test_force_refuses(capsys, sphere, change, words):

@@ -195,7 +195,6 @@ def test_process_may_end_while_data_live():
     assert in_a_process(code) == (0, "")
 
 
-@pytest.mark.xfail(strict=True, reason="unpickled data hold the address of the original's memory, and free it again")
 def test_pickled_data():
     """Data can be pickled: a copy goes on alone, and both end cleanly."""
     code = """
@@ -205,7 +204,6 @@ def test_pickled_data():
     assert in_a_process(code)[0] == 0
 
 
-@pytest.mark.xfail(strict=True, reason="MuJoCo's reader overruns its buffer on numerics of more than 500 values")
 def test_model_survives_xml():
     """A spec with sand can be written as MJCF and read again, and the force is the same to the digits written."""
     code = """
@@ -217,7 +215,6 @@ def test_model_survives_xml():
 
 
 @pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="reads the process's size from /proc")
-@pytest.mark.xfail(strict=True, reason="the copy callback allocates anew where the target has memory already")
 def test_copying_into_data_leaks_nothing(model):
     """mj_copyData into data that exist reuses their memory: 20000 copies leave the process at its size."""
 
