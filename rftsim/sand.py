@@ -56,6 +56,8 @@ class Sand:
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
             value = getattr(self, field.name)
+            if value is None and field.default is not None:
+                raise SandError(f"{field.name} must be a number, not None")
             if field.name != "source" and value is not None:
                 object.__setattr__(self, field.name, _finite(field.name, value))
         for name, low in _ABOVE_ZERO.items():
@@ -265,7 +267,8 @@ def _from_mapping(parameters: dict[str, Any]) -> Sand:
                 raise SandError(f"xi_n=cubic needs {key}")
         numbers = {key: _finite(key, parameters[key]) for key in ("rho_c", "mu_int", "g") if key in parameters}
         parameters["xi_n"] = xi_n_cubic(**numbers)
-    return PRESETS[base].replace(**parameters) if base else Sand(**parameters)
+    given: dict[str, Any] = {k: v if k == "source" else _finite(k, v) for k, v in parameters.items()}
+    return PRESETS[base].replace(**given) if base else Sand(**given)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -85,7 +85,11 @@ class Surface:
 
     def moved(self, rotation: ArrayLike, translation: ArrayLike) -> "Surface":
         """The surface after x -> rotation x + translation."""
-        return dataclasses.replace(self, triangles=self.triangles @ np.asarray(rotation).T + np.asarray(translation))
+        r, t = np.asarray(rotation), np.asarray(translation)
+        wheel = self.wheel
+        if wheel is not None:
+            wheel = Wheel(tuple(r @ wheel.axis), tuple(r @ wheel.centre + t), wheel.radius)
+        return dataclasses.replace(self, triangles=self.triangles @ r.T + t, wheel=wheel)
 
     def clustered(self, size: int) -> "Surface":
         """The surface with its triangles in an order where each `size` of them lie close together."""
@@ -204,25 +208,36 @@ def _drop(mesh: trimesh.Trimesh, keep: NDArray[np.bool_], note: str, notes: list
 
 
 def _wind(mesh: trimesh.Trimesh, name: str, notes: list[str]) -> None:
-    """Make the winding consistent, and each shell outward unless another shell encloses it."""
+    """Make the winding consistent and outward, and drop shells that lie inside another: no sand reaches them."""
     before = mesh.faces.copy()
     if _open_face(mesh.faces) is not None:
         trimesh.repair.fix_winding(mesh)
     labels = trimesh.graph.connected_component_labels(mesh.face_adjacency, node_count=len(mesh.faces))
     faces = mesh.faces.copy()
     shells = [np.flatnonzero(labels == label) for label in range(labels.max() + 1)]
-    boxes = [(mesh.triangles[s].min(axis=(0, 1)), mesh.triangles[s].max(axis=(0, 1))) for s in shells]
-    for shell, (low, high) in zip(shells, boxes, strict=True):
+    enclosed = np.zeros(len(faces), dtype=bool)
+    for shell in shells:
+        others = [other for other in shells if other is not shell]
+        point = mesh.triangles[shell[0], 0]
+        enclosed[shell] = any(abs(_winding_number(mesh.triangles[other], point)) > 0.5 for other in others)
         volume = np.einsum("ij,ij->", mesh.triangles_center[shell], np.cross(*_edges(mesh.triangles[shell]))) / 6.0
-        inside = any((low > other_low).all() and (high < other_high).all() for other_low, other_high in boxes)
-        if volume < 0.0 and not inside:
+        if volume < 0.0 and not enclosed[shell[0]]:
             faces[shell] = faces[shell][:, ::-1]
     mesh.faces = faces
-    turned = int((np.sort(before, axis=1) != np.sort(faces, axis=1)).any(axis=1).sum())
-    assert turned == 0, "winding must not change which vertices a face joins"
-    flipped = int((_cyclic(before) != _cyclic(faces)).any(axis=1).sum())
+    flipped = int((_cyclic(before) != _cyclic(faces)).any(axis=1)[~enclosed].sum())
     if flipped:
         notes.append(f"{name}: turned {flipped} of {len(faces)} faces outward")
+    _drop(mesh, ~enclosed, f"{name}: dropped %d faces of shells inside another, which no sand reaches", notes)
+
+
+def _winding_number(triangles: Array, point: Array) -> float:
+    """How often a closed shell winds around a point: solid angles, by Van Oosterom and Strackee's formula."""
+    a, b, c = np.moveaxis(triangles - point, 1, 0)
+    la, lb, lc = (np.linalg.norm(side, axis=1) for side in (a, b, c))
+    triple = np.einsum("ij,ij->i", a, np.cross(b, c))
+    dots = (np.einsum("ij,ij->i", u, v) for u, v in ((a, b), (b, c), (c, a)))
+    ab, bc, ca = dots
+    return float(np.arctan2(triple, la * lb * lc + ab * lc + bc * la + ca * lb).sum() / (2 * np.pi))
 
 
 def _edges(triangles: Array) -> tuple[Array, Array]:

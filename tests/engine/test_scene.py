@@ -21,8 +21,6 @@ CAST = (
 )
 
 
-
-
 def bed_of(mjcf, option="", sand=SAND, law="rft3d", **options):
     return add_sand(spec_of(mjcf, option), sand, law, **options)
 
