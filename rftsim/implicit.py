@@ -154,6 +154,7 @@ def evaluate(bodies, v, h, out):
         twist = twist_of(bodies, b, v)
         f, r = bodies.frame[b].ctypes.data, bodies.rotation[b].ctypes.data
         ahead(bodies.sand.ctypes.data, bodies.surface[b, 0], f, r, twist.ctypes.data, h, out[b].ctypes.data)
+        twist[0] = 0.0  # used after the call, so that it lives as long as its address is
 
 
 @njit
@@ -164,6 +165,7 @@ def differentiate(bodies, v, completed, out):
         f, r = bodies.frame[b].ctypes.data, bodies.rotation[b].ctypes.data
         s, o = bodies.sand.ctypes.data, out[b].ctypes.data
         jacobian(s, bodies.surface[b, 0], f, r, twist.ctypes.data, completed, o)
+        twist[0] = 0.0
 
 
 @njit

@@ -11,7 +11,7 @@ What must last from step to step is one array of numbers, see `state`.
 import numpy as np
 from numba import njit
 
-from rftsim import dense, implicit, kernels, native_ahead, packed
+from rftsim import dense, implicit, kernels, native_ahead, native_solver, packed
 from rftsim.implicit import CONTACT, Rows, Step
 from rftsim.state import DRIFT, HEAD, KNOWS_DERIVATIVE, KNOWS_FORCE, SPLIT, STARTED, part_of
 
@@ -66,12 +66,12 @@ def _deepest(bodies, b, twist, h):
 
 
 @njit
-def _parts(step, point, h, first_step, solved):
+def _parts(step, after, wrenches, h, first_step, solved):
     """Into how many parts a step must be split."""
     bodies = step.bodies
-    grown = implicit.generalised(bodies, point.wrench, 6) - implicit.generalised(bodies, point.wrench, 0)
+    grown = implicit.generalised(bodies, wrenches, 6) - implicit.generalised(bodies, wrenches, 0)
     late = h * dense.multiply(step.inverse, grown)
-    stopped = point.v - step.start
+    stopped = after - step.start
     worst = 0.0
     for b in range(bodies.length.size):
         length = bodies.length[b]
@@ -81,7 +81,7 @@ def _parts(step, point, h, first_step, solved):
         error = min(h * max(jumped, braked) / 8.0, travel)
         if error <= FINENESS * SHALLOWEST:
             continue
-        depth = _deepest(bodies, b, implicit.twist_of(bodies, b, point.v), h)
+        depth = _deepest(bodies, b, implicit.twist_of(bodies, b, after), h)
         if depth <= 0.0:
             continue
         allowed = FINENESS * max(depth, SHALLOWEST)
@@ -139,28 +139,38 @@ def sand_force(old, new, bodies, rows, mass, mass_h, v, h, tau, count, wrench):
         count: Evaluations, Jacobians, unsolved equations; counted up.
         wrench: Mean wrench on each body over the step, (nbody, 6), filled.
     """
-    nv = v.size
-    for i in range(new.size):
-        new[i] = 0.0
-    new[STARTED] = 1.0
-    inverse = dense.inverse(mass)
-    frames = bodies.frame.copy()
-    q = _one_step(old, new, bodies, rows, mass, inverse, mass_h, v, h, tau, MOST_PARTS, count, wrench)
+    nv, nb = v.size, bodies.length.size
+    inverse, frames = dense.inverse(mass), bodies.frame.copy()
     allowed = GAIN * dense.dot(v, dense.multiply(mass, v)) + 1e-12
-    for k in range(nv):
-        allowed += 3.0 * h * native_ahead.V_C * abs(q[k])
-    if h * dense.dot(q, v + part_of(new, 3, nv)) / 2.0 > allowed and (old[SPLIT] > 0.0 or new[SPLIT] > 0.0):
-        blank = np.zeros(old.size)
-        blank[STARTED] = 1.0
-        for b in range(frames.shape[0]):
+    before, most_parts = old.copy(), MOST_PARTS
+    q, work, slack = np.zeros(nv), 0.0, 0.0
+    for _ in range(2):
+        for i in range(new.size):
+            new[i] = 0.0
+        new[STARTED] = 1.0
+        q = _one_step(before, new, bodies, rows, mass, inverse, mass_h, v, h, tau, most_parts, count, wrench)
+        work, slack = 0.0, allowed
+        for k in range(nv):
+            work += 0.5 * h * q[k] * (v[k] + part_of(new, 3, nv)[k])
+            slack += 3.0 * h * native_ahead.V_C * abs(q[k])
+        if work <= slack or (before[SPLIT] == 0.0 and new[SPLIT] == 0.0):
+            break
+        # a split step whose mean force does work: take it whole, from MuJoCo's own velocity
+        for i in range(before.size):
+            before[i] = 0.0
+        before[STARTED], most_parts = 1.0, 1
+        for b in range(nb):
             _write(bodies.frame[b], frames[b])
-        q = _one_step(blank, new, bodies, rows, mass, inverse, mass_h, v, h, tau, 1, count, wrench)
-    if h * dense.dot(q, v + part_of(new, 3, nv)) / 2.0 > allowed:
+    if work > slack:
         # the force's own share of the work, and the rest's: scale it until they cancel
-        own = h * dense.dot(q, dense.multiply(dense.inverse(mass_h), q)) / 2.0
-        rest = dense.dot(q, v + part_of(new, 3, nv)) / 2.0 - own
+        own = 0.5 * h * dense.dot(q, dense.multiply(dense.inverse(mass_h), q))
+        rest = work / h - own
         share = 0.0 if rest >= 0.0 else min(1.0, -rest / own)
-        q, wrench[:, :] = q * share, wrench * share
+        for k in range(nv):
+            q[k] *= share
+        for b in range(nb):
+            for k in range(6):
+                wrench[b, k] *= share
     return q
 
 
@@ -176,34 +186,33 @@ def _one_step(old, new, bodies, rows, mass, inverse, mass_h, v, h, tau, most_par
     last = part_of(old, 1, nv).copy() if foreseen else v.copy()
     rows = _rows_with(rows, inverse, mass_h, rows.stiffness, rows.reference)
     step = Step(bodies, rows, mass_h, dense.inverse(mass_h), start, 0.5 * (drift + h), tau)
-    guess = implicit.predict(step, last, part_of(old, 0, nv), g, known)
-    point, known, solved = implicit.solve(step, guess, last, g, known, count)
-    parts = min(_parts(step, point, h, old[STARTED] == 0.0, solved), most_parts)
+    after, wrenches, known, solved = native_solver.solve(step, last, part_of(old, 0, nv), g, known, count)
+    parts = min(_parts(step, after, wrenches, h, old[STARTED] == 0.0, solved), most_parts)
     if parts == 1:
         count[2] += 0 if solved else 1
-        _write(part_of(new, 0, nv), implicit.generalised(bodies, point.wrench, 6))
-        _write(part_of(new, 1, nv), point.v)
+        _write(part_of(new, 0, nv), implicit.generalised(bodies, wrenches, 6))
+        _write(part_of(new, 1, nv), after)
         _write(part_of(new, 2, nv), np.zeros(nv))
-        _write(part_of(new, 3, nv), point.v)
+        _write(part_of(new, 3, nv), after)
         _write(new[HEAD + 4 * nv :], g.reshape(36 * nb))
         new[KNOWS_FORCE], new[KNOWS_DERIVATIVE], new[SPLIT] = 1.0, 1.0 if known else 0.0, 0.0
         for b in range(nb):
             for k in range(6):
-                wrench[b, k] = point.wrench[b, k]
+                wrench[b, k] = wrenches[b, k]
         if not split_before:
-            return implicit.generalised(bodies, point.wrench, 0)
-        return _force_of(mass_h, rows, point.v - v, h, tau)
-    return _split_step(old, new, step, point, mass, inverse, v, h, parts, count, wrench)
+            return implicit.generalised(bodies, wrenches, 0)
+        return _force_of(mass_h, rows, after - v, h, tau)
+    return _split_step(old, new, step, after, mass, inverse, v, h, parts, count, wrench)
 
 
 @njit
-def _split_step(old, new, whole, point, mass, inverse, v, h, parts, count, wrench):
+def _split_step(old, new, whole, after, mass, inverse, v, h, parts, count, wrench):
     """The step in parts: kicks of half the neighbouring parts, and drifts that only the depths follow."""
     nv, nb = v.size, whole.bodies.length.size
     bodies, rows, mass_h, tau = whole.bodies, whole.rows, whole.mass, whole.tau
     # contacts keep the force that the whole step gave them: MuJoCo will give them one force
     force, active = np.empty(rows.kind.size), np.empty(rows.kind.size)
-    implicit.constraint_force(rows, point.v - v, h, force, active)
+    implicit.constraint_force(rows, after - v, h, force, active)
     stiffness, tau = rows.stiffness.copy(), tau.copy()
     for i in range(rows.kind.size):
         if rows.kind[i] == CONTACT:
@@ -234,21 +243,20 @@ def _split_step(old, new, whole, point, mass, inverse, v, h, parts, count, wrenc
         seen = _rows_with(rows, inverse, mass_k, stiffness, reference)
         pushed = tau - dense.multiply(drag, kicked - v)
         step = Step(bodies, seen, mass_k, dense.inverse(mass_k), kicked, kick, pushed)
-        guess = implicit.predict(step, kicked, foreseen, g, known)
-        point, known, solved = implicit.solve(step, guess, kicked, g, known, count)
+        after, wrenches, known, solved = native_solver.solve(step, kicked, foreseen, g, known, count)
         if not solved:
             if part > h / (8.0 * parts):
                 part *= 0.25
                 continue
             count[2] += 1
-        implicit.sink(bodies, point.v, part)
-        foreseen = implicit.generalised(bodies, point.wrench, 6)
-        mean += point.v * (part / h)
-        moved += point.v * part
+        implicit.sink(bodies, after, part)
+        foreseen = implicit.generalised(bodies, wrenches, 6)
+        mean += after * (part / h)
+        moved += after * part
         for b in range(nb):
             for k in range(6):
-                wrench[b, k] += point.wrench[b, k] * (part / h)
-        kicked, drift, done = point.v, part, done + part
+                wrench[b, k] += wrenches[b, k] * (part / h)
+        kicked, drift, done = after, part, done + part
         part = min(2.0 * part, h / parts)
     _write(part_of(new, 0, nv), foreseen)
     _write(part_of(new, 1, nv), kicked)
