@@ -3,7 +3,7 @@
 The numbers are found by name. A numeric is a body's surface, or a bed's parameters, where its name without the marker
 is the body's, or the instance's, name; so MJCF attachment may put any prefix and suffix around both.
 
-What belongs to an mjData (its `plugin_data` is a number of the registry) is one block: int64 [number of bodies, numeric
+What belongs to an mjData (`plugin_data` is its number in the registry) is one block: int64 [number of bodies, numeric
 of the bed, (body, numeric of its surface) ...], then float64 [last wrench of each body (6), counters (COUNTERS), state
 after the step under way]. What must last is MuJoCo's `plugin_state`, and is brought up to date only when a step ends.
 """
@@ -17,7 +17,7 @@ from rftsim import registry, state
 from rftsim.memory import characters, doubles, int32s, int64s, pointer
 
 CHUNK: Final = 500
-"""Numbers of one numeric: MuJoCo's XML reader takes no more. A surface goes on in the numerics that follow its first."""
+"""Numbers of one numeric: MuJoCo's XML reader takes no more. A surface goes on in the numerics behind its first."""
 BODY_MARKER: Final = "rftsim-body:"
 SAND_MARKER: Final = "rftsim-sand:"
 WRENCH: Final = 6
