@@ -39,7 +39,7 @@ def body_surface(
         if collision_only and not is_colliding(model, geom):
             continue
         surface = _geom_surface(model, geom, allow_open)
-        surfaces.append(surface.refined(max_edge or surface.size / FINENESS))
+        surfaces.append(surface.refined(surface.size / FINENESS if max_edge is None else max_edge))
     return joined(surfaces) if surfaces else None
 
 

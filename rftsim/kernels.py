@@ -101,7 +101,10 @@ def _stress_3d(fit: Any, c: Any) -> Any:
 
     @njit(forceinline=True)
     def stress(nx, ny, nz, vx, vy, vz, frame, medium):
-        """Stress of 3D-RFT per depth, [Agarwal] eqs. (5.5), (5.6), (5.9), and the inertial stress of eq. (4.2)."""
+        """Stress of 3D-RFT per depth, [Agarwal] eqs. (5.5), (5.6), (5.9), and the inertial stress of eq. (4.2).
+
+        Unlike [Agarwal] eq. (5.18), a vertical face counts as facing down (m = n) whichever way it moves.
+        """
         ux, uy, uz = frame.up
         speed2 = vx * vx + vy * vy + vz * vz
         inverse = 1.0 / np.sqrt(speed2 + TINY)
@@ -109,7 +112,7 @@ def _stress_3d(fit: Any, c: Any) -> Any:
         vu = (vx * ux + vy * uy + vz * uz) * inverse
         vn_ = vx * nx + vy * ny + vz * nz
         vn = vn_ * inverse
-        side = 1.0 if nu <= medium.edge_on else -1.0  # m = side * n faces downward; rounding must not choose for a wall
+        side = 1.0 if nu <= medium.edge_on else -1.0  # m = side * n faces downward, n itself for a wall
         x1 = -vu
         x2 = -side * nu
         x3 = side * vn
@@ -159,9 +162,8 @@ def _stress_2d(nx, ny, nz, vx, vy, vz, frame, medium):
     speed2 = wx * wx + wz * wz
     inverse = 1.0 / np.sqrt(speed2 + TINY)
     mirror = 1.0 if wx >= 0.0 else -1.0
-    side = 1.0 if pz <= 0.0 else -1.0
-    mx = mirror * side * px  # sin beta
-    mz = side * pz  # -cos beta
+    mx = mirror * px  # sin beta and -cos beta but for one sign, which 2 beta does not see
+    mz = pz
     cos_gamma = mirror * wx * inverse
     sin_gamma = -wz * inverse
     cos_2beta = mz * mz - mx * mx

@@ -91,7 +91,11 @@ def _surface(model: mujoco.MjModel, i: int) -> Array:
 
 
 def wrenches(model: mujoco.MjModel, data: mujoco.MjData) -> Wrenches:
-    """Force and moment of the sand on each body, as applied in the last mj_forward or mj_step of `data`."""
+    """Force and moment of the sand on each body, as found in the last mj_forward or mj_step of `data`.
+
+    The explicit force is applied as it is. The implicit one is that at the end of the step, or its mean over the parts
+    of a split one; what MuJoCo is handed then is the generalised force that ends the step in the same place.
+    """
     force, moment = np.zeros((model.nbody, 3)), np.zeros((model.nbody, 3))
     for bed in instances(model):
         for body, wrench in read_wrenches(int(data.plugin_data[bed.id]), data._address, bed.id):

@@ -21,7 +21,7 @@ class SurfaceForce(NamedTuple):
     stress: Array
     """Traction on each triangle [Pa], shape (ntri, 3)."""
     depth: Array
-    """Depth of each centroid below the free surface [m], shape (ntri,); negative above it."""
+    """Effective depth of each centroid [m], shape (ntri,): less the drop behind a wheel; negative above the sand."""
     active: "np.ndarray[tuple[int], np.dtype[np.bool_]]"
     """Submerged and leading, shape (ntri,)."""
     power: float

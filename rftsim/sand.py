@@ -69,7 +69,7 @@ class Sand:
                 f"mu_surf = {self.mu_surf:g} exceeds mu_int = {self.mu_int:g}: sand slips inside itself first, "
                 f"so mu_surf <= {self.mu_int:g} is the largest that means anything",
                 RftsimWarning,
-                stacklevel=4,
+                stacklevel=3,
             )
         if self.xi_n is None:
             object.__setattr__(self, "xi_n", self._strength())
@@ -101,10 +101,17 @@ class Sand:
         a new `zeta` and the other way round; a new `rho_c` scales both, as does a new `g`; a new `mu_int` takes xi_n
         from Table C.1 and keeps zeta / xi_n.
         """
+        for key, value in changes.items():
+            if key not in _DEFAULTS:
+                raise SandError(f"sand has no parameter {key!r}; it has {', '.join(sorted(_DEFAULTS))}")
+            if key in ("rho_c", "mu_int", "g") and value is not None:
+                changes[key] = _finite(key, value)
+        if any(key in changes and changes[key] is None for key in ("rho_c", "mu_int")):
+            return dataclasses.replace(self, **changes)  # nothing can follow from what is unknown
         if not {"xi_n", "zeta"} & set(changes):
             assert self.xi_n is not None
             assert self.zeta is not None
-            factor = changes.get("g", self.g) / self.g
+            factor = _finite("g", changes.get("g", self.g)) / self.g
             if self.rho_c is not None:
                 factor *= changes.get("rho_c", self.rho_c) / self.rho_c
             if changes.get("mu_int", self.mu_int) != self.mu_int and self.mu_int is not None:
@@ -140,6 +147,9 @@ _ABOVE_ZERO: Final = {
     "g": True,
     "grain_diameter": True,
 }
+
+
+_DEFAULTS: Final = {field.name: field.default for field in dataclasses.fields(Sand)}
 
 
 def _finite(name: str, value: object) -> float:
@@ -227,10 +237,16 @@ def make_sand(sand: "Sand | str | Mapping[str, Any]") -> Sand:
         return sand
     if isinstance(sand, Mapping):
         return _from_mapping(dict(sand))
+    if not isinstance(sand, str):
+        raise SandError(f"sand must be a Sand, a name, key=value,..., a .toml file or a mapping, not {sand!r}")
     if sand in PRESETS:
         return PRESETS[sand]
     if "=" in sand:
-        return _from_mapping(dict(_pair(item) for item in sand.split(",") if item.strip()))
+        pairs = [_pair(item) for item in sand.split(",") if item.strip()]
+        repeated = [key for key, _ in pairs if sum(key == other for other, _ in pairs) > 1]
+        if repeated:
+            raise SandError(f"{repeated[0]!r} is given twice in the sand {sand!r}")
+        return _from_mapping(dict(pairs))
     if sand.endswith(".toml"):
         return _from_mapping(_read_toml(Path(sand)))
     raise SandError(f"no sand {sand!r}; presets are {', '.join(PRESETS)}; or give key=value,... or a .toml file")
@@ -255,18 +271,18 @@ def _read_toml(path: Path) -> dict[str, Any]:
 
 def _from_mapping(parameters: dict[str, Any]) -> Sand:
     base = parameters.pop("preset", None)
-    if base is not None and base not in PRESETS:
+    if base is not None and (not isinstance(base, str) or base not in PRESETS):
         raise SandError(f"no sand {base!r}; presets are {', '.join(PRESETS)}")
-    known = {field.name for field in dataclasses.fields(Sand)}
     for key in parameters:
-        if key not in known:
-            raise SandError(f"sand has no parameter {key!r}; it has {', '.join(sorted(known))}")
+        if key not in _DEFAULTS:
+            raise SandError(f"sand has no parameter {key!r}; it has {', '.join(sorted(_DEFAULTS))}")
     if parameters.get("xi_n") == "cubic":
-        for key in ("rho_c", "mu_int"):
-            if key not in parameters:
+        preset = dataclasses.asdict(PRESETS[base]) if base else {"g": GRAVITY}
+        known = {key: parameters.get(key, preset.get(key)) for key in ("rho_c", "mu_int", "g")}
+        for key, value in known.items():
+            if value is None:
                 raise SandError(f"xi_n=cubic needs {key}")
-        numbers = {key: _finite(key, parameters[key]) for key in ("rho_c", "mu_int", "g") if key in parameters}
-        parameters["xi_n"] = xi_n_cubic(**numbers)
+        parameters["xi_n"] = xi_n_cubic(*(_finite(key, value) for key, value in known.items()))
     given: dict[str, Any] = {k: v if k == "source" else _finite(k, v) for k, v in parameters.items()}
     return PRESETS[base].replace(**given) if base else Sand(**given)
 

@@ -45,12 +45,12 @@ def add_sand(
     sand: "Sand | str | Mapping[str, Any]" = "poppy-seeds",
     law: "Law | str" = "rft3d",
     *,
-    bodies: Iterable[str] | None = None,
+    bodies: "Iterable[str] | str | None" = None,
     surface: "FreeSurface | float" = 0.0,
     plane: ArrayLike = (0.0, 1.0, 0.0),
     geoms: Literal["collision", "all"] = "collision",
     max_edge: float | None = None,
-    wheels: "Mapping[str, Wheel] | Iterable[str]" = (),
+    wheels: "Mapping[str, Wheel] | Iterable[str] | str" = (),
     disable_floor: bool = False,
     allow_open: bool = False,
     sensors: bool = True,
@@ -91,6 +91,12 @@ def add_sand(
     """
     if force not in ("explicit", "implicit"):
         raise SceneError(f"force must be 'explicit' or 'implicit', not {force!r}")
+    if geoms not in ("collision", "all"):
+        raise SceneError(f"geoms must be 'collision' or 'all', not {geoms!r}")
+    if max_edge is not None and not max_edge > 0.0:
+        raise SceneError(f"max_edge must be positive, not {max_edge:g}")
+    bodies = [bodies] if isinstance(bodies, str) else bodies
+    wheels = [wheels] if isinstance(wheels, str) else wheels
     plugin_name = plugin.IMPLICIT if force == "implicit" else plugin.EXPLICIT
     plugin.register(plugin_name)
     bed_sand, bed_law = make_sand(sand), get_law(law)
@@ -104,10 +110,12 @@ def add_sand(
     _check_options(model, bed_sand)
     plane_normal = numbers[7:10] if bed_law.planar else None
     surfaces, reasons = _surfaces(model, bodies, geoms == "collision", max_edge, allow_open, plane_normal)
+    rolling = _with_wheels(model, surfaces, wheels)
     if bed_law.dynamic:
-        surfaces |= _with_wheels(model, surfaces, wheels)
+        surfaces |= rolling
     notes = [note for one in surfaces.values() for note in one.notes]
     floors = _floors(model, surfaces, free_surface)
+    _check_names(spec, name, surfaces, sensors, draw)
     for body, body_name in zip(spec.bodies, names, strict=True):
         body.name = body_name
     for geom, depth in floors.items():
@@ -183,6 +191,14 @@ def _shown(geom: str) -> str:
     return f"geom {name or number}"
 
 
+def _check_names(spec: mujoco.MjSpec, name: str, surfaces: Mapping[str, Surface], sensors: bool, draw: bool) -> None:
+    taken = {sensor.name for sensor in spec.sensors} & {f"{body}_sand" for body in surfaces} if sensors else set()
+    if taken:
+        raise SceneError(f"the model has a sensor {min(taken)!r} already: rename it, or pass sensors=False")
+    if draw and f"{name}_surface" in {geom.name for geom in spec.geoms}:
+        raise SceneError(f"the model has a geom '{name}_surface' already: rename it, or pass draw=False")
+
+
 def _check_options(model: mujoco.MjModel, sand: Sand) -> None:
     spring, damper = mujoco.mjtDisableBit.mjDSBL_SPRING, mujoco.mjtDisableBit.mjDSBL_DAMPER
     if model.opt.disableflags & spring and model.opt.disableflags & damper:
@@ -221,6 +237,8 @@ def _surfaces(
     reasons: dict[str, str] = {}
     for i, name in enumerate(names):
         if i == 0:
+            if chosen is not None and name in chosen:
+                raise SceneError(f"{name!r} is the world, which cannot move: name bodies that can")
             continue
         if chosen is not None and name not in chosen:
             reasons[name] = "not among the bodies asked for"
@@ -316,7 +334,7 @@ def _floors(model: mujoco.MjModel, surfaces: Mapping[str, Surface], free_surface
         if kind not in (_GEOM.mjGEOM_PLANE, _GEOM.mjGEOM_HFIELD) or not is_colliding(model, geom):
             continue
         depth = float(free_surface.offset - np.dot(free_surface.normal, data.geom_xpos[geom]))
-        if model.body_weldid[model.geom_bodyid[geom]] == 0 and depth <= reach:
+        if model.body_weldid[model.geom_bodyid[geom]] == 0 and abs(depth) <= reach:
             found[model.geom(geom).name] = depth
     return found
 

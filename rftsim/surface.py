@@ -37,7 +37,7 @@ class Wheel:
 
     def __post_init__(self) -> None:
         length = float(np.linalg.norm(self.axis))
-        if not length > 0.0 or not self.radius > 0.0:
+        if not (0.0 < length < np.inf and 0.0 < self.radius < np.inf and np.isfinite(self.centre).all()):
             raise ValueError(f"a wheel needs an axis and a positive radius, not {self.axis} and {self.radius}")
         object.__setattr__(self, "axis", tuple(float(a) / length for a in self.axis))
 
@@ -88,7 +88,7 @@ class Surface:
         r, t = np.asarray(rotation), np.asarray(translation)
         wheel = self.wheel
         if wheel is not None:
-            wheel = Wheel(tuple(r @ wheel.axis), tuple(r @ wheel.centre + t), wheel.radius)
+            wheel = Wheel(tuple((r @ wheel.axis).tolist()), tuple((r @ wheel.centre + t).tolist()), wheel.radius)
         return dataclasses.replace(self, triangles=self.triangles @ r.T + t, wheel=wheel)
 
     def clustered(self, size: int) -> "Surface":
@@ -146,7 +146,8 @@ def make_surface(
     if not len(corners):
         raise SurfaceError(f"{name} has no faces; the sand needs a closed triangle mesh")
     if corners.min() < 0 or corners.max() >= len(points):
-        raise SurfaceError(f"{name}: a face refers to vertex {corners.max()}, and there are {len(points)}")
+        wrong = corners.min() if corners.min() < 0 else corners.max()
+        raise SurfaceError(f"{name}: a face refers to vertex {wrong}; vertices are 0 to {len(points) - 1}")
     bad = ~np.isfinite(points[corners]).all(axis=(1, 2))
     if bad.any():
         raise SurfaceError(f"{name}: face {int(np.argmax(bad))} has a vertex that is not finite")

@@ -144,7 +144,7 @@ def test_open_mesh():
             CUBE.faces,
             "face . has a vertex that is not",
         ),
-        (CUBE.vertices, [*CUBE.faces, (0, 1, 8)], "refers to vertex 8, and there are 8"),
+        (CUBE.vertices, [*CUBE.faces, (0, 1, 8)], "refers to vertex 8; vertices are 0 to 7"),
         (CUBE.vertices, [*CUBE.faces, (0, 1, -1)], "refers to vertex"),
     ],
     ids=["empty", "no faces", "a point", "NaN", "infinite", "beyond the vertices", "before the vertices"],
