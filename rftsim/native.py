@@ -47,10 +47,9 @@ def _make(source: str) -> dict[str, Any]:
             return
         f, medium = packed.frame_of(s, body, x, r, v, w), packed.medium_of(s, body)
         cx, cy, cz, nx, ny, nz, area = packed.columns(body)
-        for first in range(0, area.size, kernels.BLOCK):
-            if packed.block_is_clear(body, first // kernels.BLOCK, f, 0.0):
-                continue
-            last = min(first + kernels.BLOCK, area.size)
+        last = 0
+        while last < area.size:
+            first, last = packed.next_run(body, last, area.size, f, 0.0)
             if s[0] == 0.0:
                 g = kernels.sums_2d(cx, cy, cz, nx, ny, nz, area, first, last, f, medium)
             elif s[0] == 1.0:

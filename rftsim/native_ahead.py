@@ -79,10 +79,9 @@ def _make(source: str) -> dict[str, Any]:
         total, reach = doubles(out, 12), _reach(body, f, h)
         for k in range(12):
             total[k] = 0.0
-        for first in range(0, area.size if source else 0, kernels.BLOCK):
-            if packed.block_is_clear(body, first // kernels.BLOCK, f, reach):
-                continue
-            last = min(first + kernels.BLOCK, area.size)
+        last = 0 if source else area.size
+        while last < area.size:
+            first, last = packed.next_run(body, last, area.size, f, reach)
             if s[0] == 0.0:
                 g = kernels.ahead_2d(cx, cy, cz, nx, ny, nz, area, first, last, f, medium, V_C, h)
             elif s[0] == 1.0:

@@ -114,6 +114,18 @@ def block_is_clear(body, block, frame, margin):
 
 
 @njit(forceinline=True)
+def next_run(body, start, count, frame, margin):
+    """The next triangles from start on whose blocks are not clear, first to last; both are count where none are."""
+    first = start
+    while first < count and block_is_clear(body, first // BLOCK, frame, margin):
+        first += BLOCK
+    last = first
+    while last < count and not block_is_clear(body, last // BLOCK, frame, margin):
+        last += BLOCK
+    return min(first, count), min(last, count)
+
+
+@njit(forceinline=True)
 def to_world(xmat, x, y, z):
     """Rotate a vector from the body to the world frame; xmat is row-major, (9,)."""
     return (
