@@ -14,10 +14,10 @@ from rftsim.scenes import stage
 LAWS: Final = ("rft2d", "drft2d", "rft3d", "drft3d")
 RATES: Final = {
     "grouser-wheel": (10, 30, 45, 60, 75, 90),
-    "four-flap-runner": (20, 60, 100, 150, 200, 250, 300),
+    "four-flap-runner": (20, 60, 100, 150, 200, 300),
 }
 """Imposed rates of each scene [revolutions per minute]."""
-SHORTEST: Final = 3.5
+SHORTEST: Final = 3.0
 """Simulated time of a run [s], at least."""
 
 
