@@ -1,0 +1,1 @@
+"""Gymnasium and dm_control tasks on sand. None yet."""
