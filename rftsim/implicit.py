@@ -6,122 +6,64 @@ it chatters and is biased; here v+ solves
     M (v+ - v) = h (tau + J' f(v+) + Q(v+)),
 
 tau the other smooth forces, f the constraints' by MuJoCo's own law, Q the sand's with |v| / sqrt(|v|^2 + V_C^2) before
-each triangle's stress. The solver is Newton's method with kept Jacobians (a rank-one update per body and iteration);
-where the exact Jacobian overshoots rest, one that is secant along the motion takes its place.
+each triangle's stress. The solver is Newton's method with kept derivatives of the sand (a rank-one update per body and
+iteration); each of its steps solves the constraints exactly for the sand's force linearised, which costs no evaluation.
+Where a step passes rest or the edge of a face, the next trial is at rest, or takes a derivative that does not overshoot.
 
-All twists and wrenches here are about the body's origin, in world axes: velocity or force first.
+All twists and wrenches here are about the body's origin, in world axes: velocity or force first. `p` is the address of
+the equation's table.
 """
 
-from typing import Any, NamedTuple
+from typing import Final
 
 import numpy as np
 from numba import njit
 
-from rftsim import dense, kernels, packed
-from rftsim.kernels import Frame
+from rftsim import dense, equation, packed, rows
+from rftsim.equation import AT, PART, POINT, ROW, VECTOR
+from rftsim.kernels import TINY, Frame
 from rftsim.memory import doubles
 from rftsim.native_ahead import V_C, ahead, jacobian
 
-TOLERANCE = 3e-3
+TOLERANCE: Final = 3e-3
 """Allowed error of a sand body's velocity, relative; V_C is added."""
-MOST = 40
+MOST: Final = 40
 """Iterations of one solution."""
-LOOSEST = 20.0
+LOOSEST: Final = 20.0
 """Factor to which the tolerance is loosened, from the sixth iteration on."""
-
-
-class Bodies(NamedTuple):
-    """The bodies in the sand, for one step."""
-
-    jacobian: Any
-    """Twist of each body by the generalised velocity, (nbody, 6, nv)."""
-    rotation: Any
-    """Body to world, row-major, (nbody, 9)."""
-    frame: Any
-    """(nbody, FRAME)."""
-    length: Any
-    """Length that makes a velocity of an angular one [m], (nbody,)."""
-    surface: Any
-    """Address and size of each packed surface, (nbody, 2)."""
-    sand: Any
-    """Packed sand."""
-
-
-class Rows(NamedTuple):
-    """MuJoCo's constraint rows: at an acceleration a, force -D (J a - aref), clamped by kind."""
-
-    jacobian: Any
-    """(n, nv)."""
-    acceleration: Any
-    """J M^-1 M_h, which turns (v+ - v) / h into the acceleration that the rows see, (n, nv)."""
-    stiffness: Any
-    """D, (n,)."""
-    reference: Any
-    """aref, (n,)."""
-    kind: Any
-    """EQUALITY, LIMIT, FRICTION or CONTACT, (n,)."""
-    bound: Any
-    """Largest force of a friction row, (n,)."""
-    damping: Any
-    """Derivative of -aref by the row's velocity, (n,)."""
-    spring: Any
-    """Derivative of -aref by the row's position, (n,)."""
-
-
-EQUALITY, LIMIT, FRICTION, CONTACT = 0, 1, 2, 3
-
-
-class Step(NamedTuple):
-    """One equation M (v+ - v) = h (tau + J' f + Q)."""
-
-    bodies: Bodies
-    rows: Rows
-    mass: Any
-    """M_h: the mass matrix with what the integrator takes implicitly, (nv, nv)."""
-    inverse: Any
-    """Its inverse."""
-    start: Any
-    """v, (nv,)."""
-    h: Any
-    """[s]."""
-    tau: Any
-    """(nv,)."""
-
-
-class Point(NamedTuple):
-    """A velocity that was tried."""
-
-    v: Any
-    """(nv,)."""
-    wrench: Any
-    """Of each body at the present depths, and at those after the step, (nbody, 12)."""
-    residual: Any
-    """Impulse that is missing, (nv,)."""
-    size: Any
-    """Its size in the mass metric."""
-    scale: Any
-    """Sum of the sizes of the impulses."""
-    error: Any
-    """Largest velocity error of a body over what is allowed."""
+CENTRED: Final = 2e-3
+"""Effect of the force's change within a step on a body's velocity, relative, from which on it is counted."""
+NEAR: Final = 0.25
+"""Square of the share of a body's speed that is left where a step is said to pass its rest."""
+BESIDE: Final = 0.3
+"""Speed, over V_C, at which a body is tried beside its rest."""
 
 
 @njit
-def twist_of(bodies, b, v):
-    """J_b v, (6,)."""
-    return dense.multiply(bodies.jacobian[b], v)
+def twist_of(p, b, v, out):
+    """Fill out with the twist of body b at a generalised velocity, (6,)."""
+    dense.multiply(equation.body_jacobian(p, b), v, out)
 
 
 @njit
-def speed(twist, length):
-    """|velocity| + length |angular velocity| [m/s]."""
-    linear = np.sqrt(twist[0] * twist[0] + twist[1] * twist[1] + twist[2] * twist[2])
-    return linear + length * np.sqrt(twist[3] * twist[3] + twist[4] * twist[4] + twist[5] * twist[5])
+def speed_of(p, b, v):
+    """|velocity| + length |angular velocity| of body b at a generalised velocity [m/s]."""
+    j, length = equation.body_jacobian(p, b), equation.body_length(p, b)
+    square, total = 0.0, 0.0
+    for r in range(6):
+        y = 0.0
+        for k in range(v.size):
+            y += j[r, k] * v[k]
+        square += y * y
+        if r == 2:
+            total, square = np.sqrt(square), 0.0
+    return total + length * np.sqrt(square)
 
 
 @njit
-def frame_at(bodies, b, twist):
+def frame_at(p, b, twist):
     """The frame of body b that moves with a twist."""
-    f, xmat = bodies.frame[b], bodies.rotation[b]
+    f, xmat = equation.body_frame(p, b), equation.body_rotation(p, b)
     v0 = packed.to_body(xmat, twist[0], twist[1], twist[2])
     omega = packed.to_body(xmat, twist[3], twist[4], twist[5])
     up, rise, forward = (f[0], f[1], f[2]), (f[3], f[4], f[5]), (f[6], f[7], f[8])
@@ -129,243 +71,441 @@ def frame_at(bodies, b, twist):
 
 
 @njit
-def sink(bodies, v, h):
-    """Move the depths by a time h of the motion v; positions and normals stay."""
-    for b in range(bodies.length.size):
-        f = bodies.frame[b]
-        frame = frame_at(bodies, b, twist_of(bodies, b, v))
-        rise, (wx, wy, wz) = frame.rise, frame.omega
-        f[9] -= h * (frame.v0[0] * rise[0] + frame.v0[1] * rise[1] + frame.v0[2] * rise[2])
-        f[3] += h * (rise[1] * wz - rise[2] * wy)
-        f[4] += h * (rise[2] * wx - rise[0] * wz)
-        f[5] += h * (rise[0] * wy - rise[1] * wx)
+def generalised(p, at, later, out):
+    """Fill out with the generalised force of the wrenches at a point, (nv,)."""
+    for k in range(out.size):
+        out[k] = 0.0
+    for b in range(equation.number(p, AT.nbody)):
+        dense.add_transposed(equation.body_jacobian(p, b), equation.point_wrench(p, at, b, later), 1.0, out)
 
 
 @njit
-def surface_of(bodies, b):
-    """The packed surface of body b."""
-    return doubles(bodies.surface[b, 0], bodies.surface[b, 1])
-
-
-@njit
-def evaluate(bodies, v, h, out):
-    """Wrench of each body, at the present depths and at those after a time h, (nbody, 12)."""
-    for b in range(bodies.length.size):
-        twist = twist_of(bodies, b, v)
-        f, r = bodies.frame[b].ctypes.data, bodies.rotation[b].ctypes.data
-        ahead(bodies.sand.ctypes.data, bodies.surface[b, 0], f, r, twist.ctypes.data, h, out[b].ctypes.data)
+def evaluate(p, v, at):
+    """Evaluate the wrenches at a velocity into a point."""
+    h = doubles(equation.number(p, AT.step), 2)[0]
+    twist = np.empty(6)
+    sand = equation.number(p, AT.sand)
+    for b in range(equation.number(p, AT.nbody)):
+        twist_of(p, b, v, twist)
+        f, r = equation.body_frame(p, b).ctypes.data, equation.body_rotation(p, b).ctypes.data
+        out = equation.point_wrench(p, at, b, 0).ctypes.data
+        ahead(sand, equation.body_surface(p, b), f, r, twist.ctypes.data, h, out)
         twist[0] = 0.0  # used after the call, so that it lives as long as its address is
+    doubles(equation.number(p, AT.count), 3)[0] += 1.0
 
 
 @njit
-def differentiate(bodies, v, completed, out):
-    """Derivative of each body's wrench by its twist, (nbody, 6, 6)."""
-    for b in range(bodies.length.size):
-        twist = twist_of(bodies, b, v)
-        f, r = bodies.frame[b].ctypes.data, bodies.rotation[b].ctypes.data
-        s, o = bodies.sand.ctypes.data, out[b].ctypes.data
-        jacobian(s, bodies.surface[b, 0], f, r, twist.ctypes.data, completed, o)
+def differentiate(p, v, completed):
+    """Evaluate the derivative of each body's wrench by its twist, the exact one or the completed one."""
+    twist = np.empty(6)
+    sand = equation.number(p, AT.sand)
+    for b in range(equation.number(p, AT.nbody)):
+        twist_of(p, b, v, twist)
+        f, r = equation.body_frame(p, b).ctypes.data, equation.body_rotation(p, b).ctypes.data
+        out = equation.derivative(p, AT.completed if completed else AT.derivative, b).ctypes.data
+        jacobian(sand, equation.body_surface(p, b), f, r, twist.ctypes.data, 1.0 if completed else 0.0, out)
         twist[0] = 0.0
+    doubles(equation.number(p, AT.count), 3)[1] += 1.0
 
 
 @njit
-def generalised(bodies, wrench, offset):
-    """Sum of J_b' wrench_b, (nv,), of the present wrenches (offset 0) or the later ones (offset 6)."""
-    out = np.zeros(bodies.jacobian.shape[2])
-    for b in range(bodies.length.size):
-        for r in range(6):
-            for k in range(out.size):
-                out[k] += bodies.jacobian[b, r, k] * wrench[b, offset + r]
-    return out
-
-
-@njit
-def constraint_force(rows, change, h, force, active):
-    """Force of each row at the velocity change v+ - v, and its active stiffness."""
-    for i in range(rows.kind.size):
-        x = dense.dot(rows.acceleration[i], change) / h - rows.reference[i]
-        active[i] = rows.stiffness[i]
-        force[i] = -rows.stiffness[i] * x
-        if (rows.kind[i] == LIMIT or rows.kind[i] == CONTACT) and x >= 0.0:
-            force[i], active[i] = 0.0, 0.0
-        if rows.kind[i] == FRICTION and abs(force[i]) > rows.bound[i]:
-            force[i], active[i] = (rows.bound[i] if force[i] > 0.0 else -rows.bound[i]), 0.0
-
-
-@njit
-def constrained(rows, change, h):
-    """Generalised force of the rows, (nv,)."""
-    force, active = np.empty(rows.kind.size), np.empty(rows.kind.size)
-    constraint_force(rows, change, h, force, active)
-    return dense.multiply_transposed(rows.jacobian, force)
-
-
-@njit
-def _matrix(step, v, g, use):
-    """Derivative of the residual by v, with the bodies' derivatives g."""
-    rows, bodies = step.rows, step.bodies
-    a = step.mass.copy()
-    nv = a.shape[0]
-    if use:
-        for b in range(bodies.length.size):
-            j = bodies.jacobian[b]
-            for r in range(6):
-                for k in range(nv):
-                    gj = 0.0
-                    for c in range(6):
-                        gj += g[b, r, c] * j[c, k]
-                    if gj != 0.0:
-                        for i in range(nv):
-                            a[i, k] -= step.h * j[r, i] * gj
-    force, active = np.empty(rows.kind.size), np.empty(rows.kind.size)
-    constraint_force(rows, v - step.start, step.h, force, active)
-    for i in range(rows.kind.size):
-        if active[i] > 0.0:
-            for r in range(nv):
-                q = active[i] * rows.jacobian[i, r]
-                if q != 0.0:
-                    for k in range(nv):
-                        a[r, k] += q * rows.acceleration[i, k]
-    return a
-
-
-@njit
-def try_velocity(step, v):
-    """Evaluate the equation at a velocity."""
-    bodies = step.bodies
-    wrench = np.empty((bodies.length.size, 12))
-    evaluate(bodies, v, step.h, wrench)
-    q = generalised(bodies, wrench, 0)
-    change = v - step.start
-    f = constrained(step.rows, change, step.h)
-    residual = dense.multiply(step.mass, change) - step.h * (step.tau + f + q)
-    wrong = dense.multiply(step.inverse, residual)
-    error = 0.0
-    for b in range(bodies.length.size):
-        allowed = TOLERANCE * speed(twist_of(bodies, b, v), bodies.length[b]) + V_C
-        error = max(error, speed(twist_of(bodies, b, wrong), bodies.length[b]) / allowed)
-    scale = dense.norm(step.inverse, step.tau) + dense.norm(step.inverse, f) + dense.norm(step.inverse, q)
-    size = np.sqrt(max(dense.dot(residual, wrong), 0.0))
-    return Point(v, wrench, residual, size, step.h * scale + kernels.TINY, error)
-
-
-@njit
-def predict(step, v, q, g, use):
-    """One Newton step from v with the sand's force q + sum J' g J (v' - v): no evaluation."""
-    change = v - step.start
-    f = constrained(step.rows, change, step.h)
-    residual = dense.multiply(step.mass, change) - step.h * (step.tau + f + q)
-    return v - dense.solve(_matrix(step, v, g, use), residual)
-
-
-@njit
-def _update(bodies, old, new, g):
-    """Broyden's rank-one update of each body's derivative."""
-    for b in range(bodies.length.size):
-        moved = twist_of(bodies, b, new.v - old.v)
-        l2 = bodies.length[b] * bodies.length[b]
-        square = 0.0
-        for r in range(6):
-            square += (1.0 if r < 3 else l2) * moved[r] * moved[r]
-        if square > 0.0:
-            missed = dense.multiply(g[b], moved)
-            for r in range(6):
-                y = new.wrench[b, r] - old.wrench[b, r] - missed[r]
-                for k in range(6):
-                    g[b, r, k] += y * (1.0 if k < 3 else l2) * moved[k] / square
-
-
-@njit
-def _restart(step, attempt):
-    """Where to start again: near rest along the driving impulse, free, near rest along the old velocity."""
-    if attempt == 2:
-        return step.start + step.h * dense.multiply(step.inverse, step.tau)
-    v = step.start.copy()
-    if attempt == 1:
-        v = dense.multiply(step.inverse, dense.multiply(step.mass, step.start) + step.h * step.tau)
-    fastest = kernels.TINY
-    for b in range(step.bodies.length.size):
-        fastest = max(fastest, speed(twist_of(step.bodies, b, v), step.bodies.length[b]))
-    return v * min(1.0, 0.1 * V_C / fastest)
-
-
-@njit
-def solve(step, guess, last, g, known, count):
-    """Solve the equation.
-
-    Args:
-        step: The equation.
-        guess: Where to start.
-        last: Another velocity to start from, where the guess is poor.
-        g: The bodies' derivatives, kept from before where `known`; replaced by the newest.
-        known: Whether g holds derivatives.
-        count: Evaluations and Jacobians, counted up.
+def residual_of(p, v, q, out):
+    """Fill out with the impulse that is missing at a velocity under a generalised force of the sand, (nv,).
 
     Returns:
-        The best point, whether g holds derivatives, and whether the equation is solved.
+        Size of the impulse of the constraints.
     """
-    bodies = step.bodies
-    now = try_velocity(step, guess)
-    count[0] += 1
-    best = now
-    stale = False
-    if now.error > 1.0 and now.size > 0.3 * now.scale:  # a poor guess: is the last velocity nearer?
-        other = try_velocity(step, last)
-        count[0] += 1
-        if other.size < now.size:
-            now = best = other
+    h = doubles(equation.number(p, AT.step), 2)[0]
+    start, tau, change = equation.of_dofs(p, AT.start), equation.of_dofs(p, AT.force), equation.vector(p, VECTOR.change)
+    for k in range(v.size):
+        change[k] = v[k] - start[k]
+    dense.multiply(equation.square(p, AT.mass), change, out)
+    for k in range(v.size):
+        out[k] -= h * (tau[k] + q[k])
+    if equation.number(p, AT.nrow) == 0:
+        return 0.0
+    x, force = rows.row_scratch(p, ROW.x), rows.row_scratch(p, ROW.force)
+    rows.accelerations(p, change, x)
+    rows.forces(p, x, force)
+    for k in range(v.size):
+        change[k] = 0.0
+    dense.add_transposed(equation.rows_by_dofs(p, AT.row_jacobian), force, -h, change)
+    for k in range(v.size):
+        out[k] += change[k]
+    return size(p, change)
+
+
+@njit
+def size(p, impulse):
+    """Length of an impulse in the mass metric; not of scratch vector 1."""
+    solved = equation.vector(p, VECTOR.solved)
+    dense.substitute(equation.square(p, AT.mass_factors), equation.order(p, AT.mass_order), impulse, solved)
+    return np.sqrt(max(dense.dot(impulse, solved), 0.0))
+
+
+@njit
+def attempt(p, k):
+    """Evaluate the equation at the velocity of point k."""
+    at = equation.point(p, k)
+    v, residual = equation.point_vector(p, at, PART.velocity), equation.point_vector(p, at, PART.residual)
+    evaluate(p, v, at)
+    q, step = equation.vector(p, VECTOR.sand), doubles(equation.number(p, AT.step), 2)
+    generalised(p, at, 0, q)
+    scale = residual_of(p, v, q, residual) + step[0] * size(p, q) + step[1]
+    wrong, error = equation.vector(p, VECTOR.solved), 0.0
+    missing = size(p, residual)  # leaves the velocity error in scratch vector 1
+    for b in range(equation.number(p, AT.nbody)):
+        error = max(error, speed_of(p, b, wrong) / (TOLERANCE * speed_of(p, b, v) + V_C))
+    scores = equation.point_scores(p, at)
+    scores[0], scores[1], scores[2] = missing, scale + TINY, error
+
+
+@njit
+def copy_point(p, origin, target):
+    """Copy a point."""
+    n = equation.point_size(equation.number(p, AT.nbody), equation.number(p, AT.nv))
+    dense.copy(doubles(equation.point(p, origin), n), doubles(equation.point(p, target), n))
+
+
+@njit
+def _linearise(p, entry, use):
+    """Fill scratch matrix 0 with M - h J' G J, G the derivatives in an entry; with M where they are not in use."""
+    h = doubles(equation.number(p, AT.step), 2)[0]
+    a, mass = equation.scratch(p, 0), equation.square(p, AT.mass)
+    nv = a.shape[0]
+    for i in range(nv):
+        for k in range(nv):
+            a[i, k] = mass[i, k]
+    if not use:
+        return
+    column = equation.vector(p, VECTOR.change)
+    for b in range(equation.number(p, AT.nbody)):
+        j, g = equation.body_jacobian(p, b), equation.derivative(p, entry, b)
+        for r in range(6):
+            for k in range(nv):
+                column[k] = 0.0
+            for c in range(6):
+                y = -h * g[r, c]
+                for k in range(nv):
+                    column[k] += y * j[c, k]
+            for i in range(nv):
+                y = j[r, i]
+                if y != 0.0:
+                    for k in range(nv):
+                        a[i, k] += y * column[k]
+
+
+@njit
+def _factor_with_rows(p, x, force):
+    """Fill scratch matrix 1 with the factors of scratch matrix 0 and the rows' stiffness at x."""
+    base, a = equation.scratch(p, 0), equation.scratch(p, 1)
+    for i in range(a.shape[0]):
+        for k in range(a.shape[0]):
+            a[i, k] = base[i, k]
+    if equation.number(p, AT.nrow) > 0:
+        rows.add_stiffness(p, x, force, a)
+    dense.factor(a, equation.order(p, AT.order))
+
+
+@njit
+def linear_solution(p, v, residual, entry, use, out):
+    """Fill out with the velocity that solves the equation for the sand's force linearised at v, the rows exactly.
+
+    Newton's method on the rows, each step to where the missing impulse along it vanishes: a convex problem.
+    """
+    _linearise(p, entry, use)
+    lu, order = equation.scratch(p, 1), equation.order(p, AT.order)
+    direction, missing = equation.vector(p, VECTOR.direction), equation.vector(p, VECTOR.missing)
+    if equation.number(p, AT.nrow) == 0:
+        _factor_with_rows(p, missing, missing)
+        dense.substitute(lu, order, residual, direction)
+        for k in range(v.size):
+            out[k] = v[k] - direction[k]
+        return
+    h = doubles(equation.number(p, AT.step), 2)[0]
+    base, start = equation.scratch(p, 0), equation.of_dofs(p, AT.start)
+    j = equation.rows_by_dofs(p, AT.row_jacobian)
+    x, force, moved, tried = (
+        rows.row_scratch(p, ROW.x),
+        rows.row_scratch(p, ROW.force),
+        rows.row_scratch(p, ROW.moved),
+        rows.row_scratch(p, ROW.tried),
+    )
+    change, fixed = equation.vector(p, VECTOR.change), equation.vector(p, VECTOR.fixed)
+    for k in range(v.size):
+        change[k] = v[k] - start[k]
+        out[k] = v[k]
+        fixed[k] = residual[k]
+        missing[k] = residual[k]
+    rows.accelerations(p, change, x)
+    rows.forces(p, x, force)
+    dense.add_transposed(j, force, h, fixed)  # the residual at v but for the rows
+    target = 1e-16 * (dense.dot(residual, residual) + TINY)
+    for _ in range(20):
+        _factor_with_rows(p, x, force)
+        dense.substitute(lu, order, missing, direction)
+        for k in range(v.size):
+            direction[k] = -direction[k]
+        dense.multiply(base, direction, change)
+        stiff, slope = dense.dot(direction, change), dense.dot(direction, fixed)
+        dense.multiply(equation.rows_by_dofs(p, AT.row_acceleration), direction, moved)
+        for i in range(moved.size):
+            moved[i] /= h
+        t = _crossing(p, j, direction, x, moved, tried, force, slope, stiff, h)
+        for k in range(v.size):
+            out[k] += t * direction[k]
+            fixed[k] += t * change[k]
+            missing[k] = fixed[k]
+        for i in range(x.size):
+            x[i] += t * moved[i]
+        rows.forces(p, x, force)
+        dense.add_transposed(j, force, -h, missing)
+        if dense.dot(missing, missing) <= target:
+            break
+
+
+@njit
+def _along(p, j, direction, x, moved, tried, force, slope, stiff, h, t):
+    """Missing impulse along a direction after a share t of it."""
+    for i in range(x.size):
+        tried[i] = x[i] + t * moved[i]
+    rows.forces(p, tried, force)
+    total = slope + t * stiff
+    for i in range(x.size):
+        if force[i] != 0.0:
+            total -= h * force[i] * dense.dot(j[i], direction)
+    return total
+
+
+@njit
+def _crossing(p, j, direction, x, moved, tried, force, slope, stiff, h):
+    """The share t of a direction, at most one, after which the missing impulse along it vanishes."""
+    low, at_low = 0.0, _along(p, j, direction, x, moved, tried, force, slope, stiff, h, 0.0)
+    high, at_high = 1.0, _along(p, j, direction, x, moved, tried, force, slope, stiff, h, 1.0)
+    if at_high <= 1e-6 * abs(at_low) or at_low >= 0.0:
+        return 1.0
+    wanted, t = 1e-3 * abs(at_low), 1.0
+    for _ in range(20):
+        t = low - at_low * (high - low) / (at_high - at_low)
+        margin = 0.05 * (high - low)
+        t = min(max(t, low + margin), high - margin)
+        found = _along(p, j, direction, x, moved, tried, force, slope, stiff, h, t)
+        if abs(found) < wanted:
+            break
+        if found < 0.0:
+            low, at_low = t, found
+        else:
+            high, at_high = t, found
+    return t
+
+
+@njit
+def _update(p, old, new):
+    """Broyden's rank-one update of each body's derivative from two points."""
+    moved, twist = np.empty(6), np.empty(6)
+    v = equation.point_vector(p, equation.point(p, old), PART.velocity)
+    u = equation.point_vector(p, equation.point(p, new), PART.velocity)
+    for b in range(equation.number(p, AT.nbody)):
+        twist_of(p, b, u, moved)
+        twist_of(p, b, v, twist)
+        length, square = equation.body_length(p, b), 0.0
+        for r in range(6):
+            moved[r] -= twist[r]
+            square += (1.0 if r < 3 else length * length) * moved[r] * moved[r]
+        if square <= 0.0:
+            continue
+        g = equation.derivative(p, AT.derivative, b)
+        before = equation.point_wrench(p, equation.point(p, old), b, 0)
+        after = equation.point_wrench(p, equation.point(p, new), b, 0)
+        for r in range(6):
+            y = after[r] - before[r]
+            for k in range(6):
+                y -= g[r, k] * moved[k]
+            y /= square
+            for k in range(6):
+                g[r, k] += y * (1.0 if k < 3 else length * length) * moved[k]
+
+
+@njit
+def _rest_along(p, direction, share):
+    """Share of a direction from point POINT.now on at which a body is beside its rest; 0 where none comes near.
+
+    Before its rest where the sand must push the body on, behind it where the sand must hold it back.
+    """
+    at = equation.point(p, POINT.now)
+    v = equation.point_vector(p, at, PART.velocity)
+    a, c, there, q = np.empty(6), np.empty(6), equation.vector(p, VECTOR.sand), equation.vector(p, VECTOR.missing)
+    found = 0.0
+    for b in range(equation.number(p, AT.nbody)):
+        twist_of(p, b, v, a)
+        twist_of(p, b, direction, c)
+        aa = ac = cc = 0.0
+        for k in range(6):
+            weight = 1.0 if k < 3 else equation.body_length(p, b) ** 2
+            c[k] *= share
+            aa += weight * a[k] * a[k]
+            ac += weight * a[k] * c[k]
+            cc += weight * c[k] * c[k]
+        if cc == 0.0 or ac >= 0.0 or -ac >= cc or aa < (10.0 * V_C) ** 2 or aa - ac * ac / cc > NEAR * aa:
+            continue
+        t = -ac / cc
+        if found > 0.0 and t >= found:
+            continue
+        for k in range(v.size):
+            there[k] = v[k] + t * share * direction[k]
+        generalised(p, at, 0, q)
+        dense.add_transposed(equation.body_jacobian(p, b), equation.point_wrench(p, at, b, 0), -1.0, q)
+        missing = equation.vector(p, VECTOR.fixed)
+        residual_of(p, there, q, missing)
+        side = 1.0 if dense.dot(missing, direction) < 0.0 else -1.0
+        found = max(t + side * BESIDE * V_C / np.sqrt(cc), 1e-12)
+    return found * share
+
+
+@njit
+def _try_along(p, direction, t, k):
+    """Evaluate the equation a share t of a direction from point POINT.now on, into point k."""
+    v = equation.point_vector(p, equation.point(p, POINT.now), PART.velocity)
+    new = equation.point_vector(p, equation.point(p, k), PART.velocity)
+    for i in range(new.size):
+        new[i] = v[i] + t * direction[i]
+    attempt(p, k)
+
+
+@njit
+def centre(p):
+    """Fill END: the best point, corrected to first order for the force at the step's mean velocity instead of its end.
+
+    What is stiff against the mass is left out, by M A^-1: a body that stops in the step stays stopped.
+    """
+    at = equation.point(p, POINT.best)
+    v, start, end = (
+        equation.point_vector(p, at, PART.velocity),
+        equation.of_dofs(p, AT.start),
+        equation.of_dofs(p, AT.end),
+    )
+    dense.copy(v, end)
+    if doubles(equation.number(p, AT.flags), 2)[0] == 0.0:
+        return
+    h = doubles(equation.number(p, AT.step), 2)[0]
+    mean, difference, solved = (
+        equation.vector(p, VECTOR.mean),
+        equation.vector(p, VECTOR.difference),
+        equation.vector(p, VECTOR.filtered),
+    )
+    twist, wrench = np.empty(6), np.empty(6)
+    for k in range(v.size):
+        mean[k] = v[k] - start[k]
+        difference[k] = 0.0
+    for b in range(equation.number(p, AT.nbody)):
+        twist_of(p, b, mean, twist)
+        dense.multiply(equation.derivative(p, AT.derivative, b), twist, wrench)
+        dense.add_transposed(equation.body_jacobian(p, b), wrench, -0.5 * h, difference)
+    _linearise(p, AT.derivative, True)
+    x, force = rows.row_scratch(p, ROW.x), rows.row_scratch(p, ROW.force)
+    if x.size > 0:
+        rows.accelerations(p, mean, x)
+        rows.forces(p, x, force)
+    _factor_with_rows(p, x, force)
+    _filter(p, difference, solved)
+    effect = 0.0
+    for b in range(equation.number(p, AT.nbody)):
+        effect = max(effect, speed_of(p, b, solved) / (CENTRED * speed_of(p, b, v) + 10.0 * V_C))
+    if effect < 1.0:
+        return
+    for k in range(v.size):
+        mean[k] = 0.5 * (start[k] + v[k])
+    spare = equation.point(p, POINT.spare)
+    evaluate(p, mean, spare)
+    generalised(p, spare, 0, difference)
+    generalised(p, at, 0, mean)
+    for k in range(v.size):
+        difference[k] = h * (difference[k] - mean[k])
+    _filter(p, difference, solved)
+    for k in range(v.size):
+        end[k] += solved[k]
+
+
+@njit
+def _filter(p, impulse, out):
+    """Fill out with A^-1 M A^-1 impulse, A the factors in scratch matrix 1."""
+    lu, order, between = equation.scratch(p, 1), equation.order(p, AT.order), equation.vector(p, VECTOR.solved)
+    dense.substitute(lu, order, impulse, out)
+    dense.multiply(equation.square(p, AT.mass), out, between)
+    dense.substitute(lu, order, between, out)
+
+
+@njit
+def solve(p):
+    """Solve the equation: fill AT.end and AT.flags, leave the velocity and its wrenches in point POINT.best."""
+    flags = doubles(equation.number(p, AT.flags), 2)
+    known = flags[0] > 0.0
+    dense.factor_of(equation.square(p, AT.mass), equation.square(p, AT.mass_factors), equation.order(p, AT.mass_order))
+    step, last = doubles(equation.number(p, AT.step), 2), equation.of_dofs(p, AT.last)
+    step[1] = step[0] * size(p, equation.of_dofs(p, AT.force))
+    now = equation.point_scores(p, equation.point(p, POINT.now))
+    new = equation.point_scores(p, equation.point(p, POINT.new))
+    best = equation.point_scores(p, equation.point(p, POINT.best))
+    v = equation.point_vector(p, equation.point(p, POINT.now), PART.velocity)
+    residual = equation.point_vector(p, equation.point(p, POINT.now), PART.residual)
+    new_residual = equation.point_vector(p, equation.point(p, POINT.new), PART.residual)
+    direction = equation.vector(p, VECTOR.mean)
+    residual_of(p, last, equation.of_dofs(p, AT.foreseen), residual)
+    linear_solution(p, last, residual, AT.derivative, known, v)
+    attempt(p, POINT.now)
+    stale = fresh = by_secant = False
+    if now[2] > 1.0 and now[0] > 0.3 * now[1]:  # a poor guess: is the last velocity nearer?
+        dense.copy(last, equation.point_vector(p, equation.point(p, POINT.new), PART.velocity))
+        attempt(p, POINT.new)
+        if new[0] < now[0]:
+            copy_point(p, POINT.new, POINT.now)
             stale = True
-    fresh = by_secant = False
-    secant = shortened = failures = restarts = 0
+    copy_point(p, POINT.now, POINT.best)
+    secant = shortened = failures = iteration = 0
     loose, t = 1.0, 1.0
-    next_restart = 12
-    completed = np.empty_like(g)
-    direction = np.zeros(step.start.size)
-    iteration = 0
-    while best.error > loose and iteration < MOST:
+    while best[2] > loose and iteration < MOST:
         iteration += 1
         if iteration > 6:
             loose = min(1.5 * loose, LOOSEST)
-        if iteration > 10 and best.size < 5e-3 * best.scale:  # a face on its edge: no closer solution exists
+        if iteration > 10 and best[0] < 5e-3 * best[1]:  # a face on its edge: no closer solution exists
             break
-        if iteration >= next_restart and best.size > 0.05 * best.scale and shortened == 0 and restarts < 3:
-            restarts += 1
-            next_restart = iteration + 12
-            now = try_velocity(step, _restart(step, restarts))
-            count[0] += 1
-            stale, fresh, secant = True, False, 0
         if shortened == 0:
             by_secant = secant > 0
             if by_secant:
-                differentiate(bodies, now.v, 1.0, completed)
-                count[1] += 1
+                differentiate(p, v, True)
                 secant -= 1
-                direction = -dense.solve(_matrix(step, now.v, completed, True), now.residual)
-            else:
-                if not fresh and (stale or not known):
-                    differentiate(bodies, now.v, 0.0, g)
-                    count[1] += 1
-                    known, fresh, stale = True, True, False
-                direction = -dense.solve(_matrix(step, now.v, g, True), now.residual)
+            elif not fresh and (stale or not known):
+                differentiate(p, v, False)
+                known, fresh, stale = True, True, False
+            linear_solution(p, v, residual, AT.completed if by_secant else AT.derivative, True, direction)
+            for k in range(v.size):
+                direction[k] -= v[k]
             t = 1.0
-        new = try_velocity(step, now.v + t * direction)
-        count[0] += 1
-        if new.error < best.error:
-            best = new
-        if new.error > loose:
-            before, after = dense.dot(now.residual, direction), dense.dot(new.residual, direction)
+        _try_along(p, direction, t, POINT.new)
+        if new[2] < best[2]:
+            copy_point(p, POINT.new, POINT.best)
+        if new[2] > loose:
+            before, after = dense.dot(residual, direction), dense.dot(new_residual, direction)
             crossing = -before / (after - before) if after > 0.0 and before < 0.0 else 0.5
-            if not by_secant and not (new.size < 0.9 * now.size and after <= 0.2 * abs(before)):
+            if not by_secant and not (new[0] < 0.9 * now[0] and after <= 0.2 * abs(before)):
                 if not fresh:
                     stale, shortened = True, 0
-                elif now.size < 0.1 * now.scale and shortened < 2:  # a face changes its side along the way
+                    continue
+                rest = _rest_along(p, direction, t) if shortened == 0 else 0.0
+                if rest > 0.0:
+                    _try_along(p, direction, rest, POINT.new)
+                    copy_point(p, POINT.new, POINT.now)
+                    if now[2] < best[2]:
+                        copy_point(p, POINT.now, POINT.best)
+                    stale, fresh, shortened = True, False, 0
+                elif now[0] < 0.5 * now[1] and shortened < 2:  # a face changes its side along the way
                     t *= min(max(crossing, 0.1), 0.7)
                     shortened += 1
-                else:  # the exact derivative overshot rest
+                else:
                     failures += 1
                     secant, shortened = min(2 * failures, 8), 0
                 continue
-            if by_secant and after > 0.3 * abs(before) and new.size > 0.7 * now.size and shortened < 3:
+            if by_secant and after > 0.3 * abs(before) and new[0] > 0.7 * now[0] and shortened < 3:
                 t *= min(max(crossing, 0.1), 0.7)
                 shortened += 1
                 continue
@@ -373,8 +513,10 @@ def solve(step, guess, last, g, known, count):
         if by_secant:
             stale = True
         else:
-            stale = new.size > 0.3 * now.size
-            _update(bodies, now, new, g)
+            stale = new[0] > 0.3 * now[0]
+            _update(p, POINT.now, POINT.new)
         fresh = False
-        now = new
-    return best, known, best.error <= LOOSEST or best.size <= 1e-2 * best.scale
+        copy_point(p, POINT.new, POINT.now)
+    flags[0] = 1.0 if known else 0.0
+    flags[1] = 1.0 if best[2] <= LOOSEST or best[0] <= 1e-2 * best[1] else 0.0
+    centre(p)

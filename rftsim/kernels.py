@@ -353,27 +353,37 @@ def _jacobians(stress: Any) -> Any:
             p0, p1, p2 = 1.0 + sign * a * a * turn, sign * a * b * turn, -sign * a
             q0, q1, q2 = a * b * turn, sign + b * b * turn, -b
             d = STEP_ASIDE
-            s0, s1, s2, inertia, i0, i1, i2 = stress(n0, n1, n2, vx, vy, vz, frame, medium)
-            i0, i1, i2 = inertia * i0, inertia * i1, inertia * i2
-            e0, e1, e2, _, _, _, _ = stress(n0, n1, n2, a + d * p0, b + d * p1, c + d * p2, frame, medium)
-            f0, f1, f2, _, _, _, _ = stress(n0, n1, n2, a + d * q0, b + d * q1, c + d * q2, frame, medium)
+            # the completed derivative takes the leading-edge rule apart: see below
+            bare = Medium(medium.xi, medium.mu_surf, medium.lambda_rho, medium.edge_on, (1.0 - completed) * medium.ramp)
+            s0, s1, s2, inertia, i0, i1, i2 = stress(n0, n1, n2, vx, vy, vz, frame, bare)
+            e0, e1, e2, _, _, _, _ = stress(n0, n1, n2, a + d * p0, b + d * p1, c + d * p2, frame, bare)
+            f0, f1, f2, _, _, _, _ = stress(n0, n1, n2, a + d * q0, b + d * q1, c + d * q2, frame, bare)
             depth = _depth(x, y, z, frame)
             radius = 1.0 / np.sqrt(speed2 + v_c * v_c + TINY)
             weight = area[t] * larger(depth, 0.0) * radius if speed2 > 0.0 else 0.0
+            # |n.v| changes sign at an edge: P (1 + sign) / 2, by the secant 1 / |n.v| of the sign
+            vn = vx * i0 + vy * i1 + vz * i2
+            share = completed * _leading(vn * inverse, speed2, medium) + (1.0 - completed)
+            half = 0.5 / (radius * medium.ramp)
+            edge = -0.5 * completed * abs(s0 * i0 + s1 * i1 + s2 * i2) / larger(abs(vn + half), half)
+            edge *= weight * np.sqrt(speed2 + TINY)
+            j0, j1, j2 = i0, i1, i2
+            i0, i1, i2 = inertia * i0, inertia * i1, inertia * i2
             along = weight * (completed + (1.0 - completed) * v_c * v_c * radius * radius)
-            across = weight / d
+            across = share * weight / d
+            along *= share
             brake = (2.0 * area[t] if depth > 0.0 else 0.0) / smaller(vx * i0 + vy * i1 + vz * i2, -TINY)
             e0, e1, e2 = across * (e0 - s0), across * (e1 - s1), across * (e2 - s2)
             f0, f1, f2 = across * (f0 - s0), across * (f1 - s1), across * (f2 - s2)
-            k[i] = e0 * p0 + f0 * q0 + along * s0 * a + brake * i0 * i0
-            k[i + 1 * BLOCK] = e0 * p1 + f0 * q1 + along * s0 * b + brake * i0 * i1
-            k[i + 2 * BLOCK] = e0 * p2 + f0 * q2 + along * s0 * c + brake * i0 * i2
-            k[i + 3 * BLOCK] = e1 * p0 + f1 * q0 + along * s1 * a + brake * i1 * i0
-            k[i + 4 * BLOCK] = e1 * p1 + f1 * q1 + along * s1 * b + brake * i1 * i1
-            k[i + 5 * BLOCK] = e1 * p2 + f1 * q2 + along * s1 * c + brake * i1 * i2
-            k[i + 6 * BLOCK] = e2 * p0 + f2 * q0 + along * s2 * a + brake * i2 * i0
-            k[i + 7 * BLOCK] = e2 * p1 + f2 * q1 + along * s2 * b + brake * i2 * i1
-            k[i + 8 * BLOCK] = e2 * p2 + f2 * q2 + along * s2 * c + brake * i2 * i2
+            k[i] = e0 * p0 + f0 * q0 + along * s0 * a + brake * i0 * i0 + edge * j0 * j0
+            k[i + 1 * BLOCK] = e0 * p1 + f0 * q1 + along * s0 * b + brake * i0 * i1 + edge * j0 * j1
+            k[i + 2 * BLOCK] = e0 * p2 + f0 * q2 + along * s0 * c + brake * i0 * i2 + edge * j0 * j2
+            k[i + 3 * BLOCK] = e1 * p0 + f1 * q0 + along * s1 * a + brake * i1 * i0 + edge * j1 * j0
+            k[i + 4 * BLOCK] = e1 * p1 + f1 * q1 + along * s1 * b + brake * i1 * i1 + edge * j1 * j1
+            k[i + 5 * BLOCK] = e1 * p2 + f1 * q2 + along * s1 * c + brake * i1 * i2 + edge * j1 * j2
+            k[i + 6 * BLOCK] = e2 * p0 + f2 * q0 + along * s2 * a + brake * i2 * i0 + edge * j2 * j0
+            k[i + 7 * BLOCK] = e2 * p1 + f2 * q1 + along * s2 * b + brake * i2 * i1 + edge * j2 * j1
+            k[i + 8 * BLOCK] = e2 * p2 + f2 * q2 + along * s2 * c + brake * i2 * i2 + edge * j2 * j2
 
     @njit(fastmath=FASTMATH, error_model="numpy", forceinline=True)
     def jacobian(cx, cy, cz, nx, ny, nz, area, first, last, frame, medium, v_c, completed, scratch, out):

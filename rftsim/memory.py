@@ -27,6 +27,12 @@ def doubles(address, size):
 
 
 @njit(forceinline=True)
+def matrix(address, rows, columns):
+    """View of rows x columns float64 at an address, row by row."""
+    return carray(_doubles(address), (rows, columns))
+
+
+@njit(forceinline=True)
 def int32s(address, size):
     """View of `size` int32 at an address."""
     return carray(_int32s(address), (size,))

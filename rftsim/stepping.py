@@ -5,83 +5,159 @@ Jacobians and normals frozen and only the depths moving; MuJoCo is then handed t
 sub-cycled path ends. MuJoCo's velocity is the mean one of that path; what it lacks to the true one is carried to the
 next step.
 
-What must last from step to step is one array of numbers, see `state`.
+What must last from step to step is one array of numbers, see `state`; the step's equation is a table, see `equation`.
 """
+
+from typing import Final
 
 import numpy as np
 from numba import njit
 
-from rftsim import dense, implicit, kernels, native_ahead, native_solver, packed
-from rftsim.implicit import CONTACT, Rows, Step
-from rftsim.state import DRIFT, HEAD, KNOWS_DERIVATIVE, KNOWS_FORCE, SPLIT, STARTED, part_of
+from rftsim import dense, equation, implicit, kernels, native_ahead, native_solver, packed, rows
+from rftsim.equation import AT, KEEP, KIND, PART, POINT, ROW
+from rftsim.memory import doubles, int64s
+from rftsim.native_ahead import FRAME
+from rftsim.state import DRIFT, HEAD, KNOWS_DERIVATIVE, KNOWS_FORCE, SPLIT, STARTED, part_of, state_size
 
-FINENESS = 5e-3
+FINENESS: Final = 5e-3
 """Error of the position in a step, over the depth, above which the step is split."""
-SHALLOWEST = 1e-4
+SHALLOWEST: Final = 1e-4
 """Depth [m] below which none is resolved."""
-MOST_PARTS = 256
-GAIN = 1e-4
+MOST_PARTS: Final = 256
+GAIN: Final = 1e-4
 """Work that the sand may do in a step over the kinetic energy: rounding, not physics, and more is taken back."""
-FALL = 30.0
+FALL: Final = 30.0
 """Acceleration that bodies are watched for on their way to the sand [m/s^2]."""
 
 
 @njit
-def _write(target, origin):
-    for i in range(target.size):
-        target[i] = origin[i]
+def _state(p, entry):
+    return doubles(equation.number(p, entry), state_size(equation.number(p, AT.nbody), equation.number(p, AT.nv)))
 
 
 @njit
-def _is_near(bodies, v, h):
+def _timestep(p):
+    return doubles(equation.number(p, AT.timestep), 1)[0]
+
+
+@njit
+def _speed_in(p, b, v, share):
+    """Speed of body b, angular velocity counted with `share` times its length."""
+    twist = np.empty(6)
+    implicit.twist_of(p, b, v, twist)
+    linear = np.sqrt(twist[0] * twist[0] + twist[1] * twist[1] + twist[2] * twist[2])
+    angular = np.sqrt(twist[3] * twist[3] + twist[4] * twist[4] + twist[5] * twist[5])
+    return linear + share * equation.body_length(p, b) * angular
+
+
+@njit
+def is_near(p):
     """Whether any triangle can be in the sand within the step."""
-    for b in range(bodies.length.size):
-        surface = implicit.surface_of(bodies, b)
-        twist = implicit.twist_of(bodies, b, v)
-        frame = implicit.frame_at(bodies, b, twist)
+    v, h, twist = equation.of_dofs(p, AT.velocity), _timestep(p), np.zeros(6)
+    for b in range(equation.number(p, AT.nbody)):
+        surface = doubles(equation.body_surface(p, b), packed.HEADER)
+        frame = implicit.frame_at(p, b, twist)
         depth = frame.height
         for k in range(3):
             depth -= min(frame.rise[k] * surface[1 + k], frame.rise[k] * surface[4 + k])
-        if depth + h * (implicit.speed(twist, 2.0 * bodies.length[b]) + h * FALL) > 0.0:
+        if depth + h * (_speed_in(p, b, v, 2.0) + h * FALL) > 0.0:
             return True
     return False
 
 
 @njit
-def _deepest(bodies, b, twist, h):
-    """Largest depth of a body's triangles, now or after a time h [m]."""
-    surface = implicit.surface_of(bodies, b)
-    cx, cy, cz, _, _, _, area = packed.columns(surface)
-    frame = implicit.frame_at(bodies, b, twist)
-    found = kernels.deepest(cx, cy, cz, 0, area.size, frame)
-    v, w, r = frame.v0, frame.omega, frame.rise
-    height = frame.height - h * (v[0] * r[0] + v[1] * r[1] + v[2] * r[2])
-    rise = (
+def is_needed(p):
+    """Whether the sand can act in the step; where not, the new state is filled."""
+    if _state(p, AT.old)[SPLIT] > 0.0 or is_near(p):
+        return True
+    _begin(_state(p, AT.new))
+    return False
+
+
+@njit
+def _begin(new):
+    for i in range(new.size):
+        new[i] = 0.0
+    new[STARTED] = 1.0
+
+
+@njit
+def _turned(twist_frame, h):
+    """The gradient of the depth after a time h."""
+    r, w = twist_frame.rise, twist_frame.omega
+    return (
         r[0] + h * (r[1] * w[2] - r[2] * w[1]),
         r[1] + h * (r[2] * w[0] - r[0] * w[2]),
         r[2] + h * (r[0] * w[1] - r[1] * w[0]),
     )
-    later = kernels.Frame(v, w, frame.up, rise, frame.forward, height, frame.rear, frame.drop)
-    return max(found, kernels.deepest(cx, cy, cz, 0, area.size, later))
 
 
 @njit
-def _parts(step, after, wrenches, h, first_step, solved):
-    """Into how many parts a step must be split."""
-    bodies = step.bodies
-    grown = implicit.generalised(bodies, wrenches, 6) - implicit.generalised(bodies, wrenches, 0)
-    late = h * dense.multiply(step.inverse, grown)
-    stopped = after - step.start
+def _lowered(frame, h):
+    """The depth of a body's origin after a time h."""
+    v, r = frame.v0, frame.rise
+    return frame.height - h * (v[0] * r[0] + v[1] * r[1] + v[2] * r[2])
+
+
+@njit
+def _sink(p, v, h):
+    """Move the depths by a time h of the motion v; positions and normals stay."""
+    twist = np.empty(6)
+    for b in range(equation.number(p, AT.nbody)):
+        implicit.twist_of(p, b, v, twist)
+        frame, f = implicit.frame_at(p, b, twist), equation.body_frame(p, b)
+        f[9] = _lowered(frame, h)
+        f[3], f[4], f[5] = _turned(frame, h)
+
+
+@njit
+def _deepest(p, b, v, h):
+    """Largest depth of a body's triangles, now or after a time h [m]."""
+    twist = np.empty(6)
+    implicit.twist_of(p, b, v, twist)
+    address = equation.body_surface(p, b)
+    surface = doubles(address, packed.size_of(doubles(address, packed.HEADER)))
+    cx, cy, cz, _, _, _, area = packed.columns(surface)
+    frame, found = implicit.frame_at(p, b, twist), -1e30
+    for _ in range(2):
+        found = max(found, kernels.deepest(cx, cy, cz, 0, area.size, frame))
+        frame = kernels.Frame(
+            frame.v0,
+            frame.omega,
+            frame.up,
+            _turned(frame, h),
+            frame.forward,
+            _lowered(frame, h),
+            frame.rear,
+            frame.drop,
+        )
+    return found
+
+
+@njit
+def _parts(p, first_step, solved):
+    """Into how many parts a step must be split; its solution is in point BEST."""
+    h, at = _timestep(p), equation.point(p, POINT.best)
+    after, start = equation.point_vector(p, at, PART.velocity), equation.of_dofs(p, AT.start)
+    grown, late, stopped = (
+        equation.step_vector(p, KEEP.one),
+        equation.step_vector(p, KEEP.two),
+        equation.step_vector(p, KEEP.three),
+    )
+    implicit.generalised(p, at, 1, grown)
+    implicit.generalised(p, at, 0, late)
+    for k in range(after.size):
+        grown[k] = h * (grown[k] - late[k])
+        stopped[k] = after[k] - start[k]
+    dense.substitute(equation.square(p, AT.mass_factors), equation.order(p, AT.mass_order), grown, late)
     worst = 0.0
-    for b in range(bodies.length.size):
-        length = bodies.length[b]
-        travel = h * implicit.speed(implicit.twist_of(bodies, b, step.start), length)
-        jumped = implicit.speed(implicit.twist_of(bodies, b, late), length)
-        braked = implicit.speed(implicit.twist_of(bodies, b, stopped), length)
-        error = min(h * max(jumped, braked) / 8.0, travel)
+    for b in range(equation.number(p, AT.nbody)):
+        travel = h * implicit.speed_of(p, b, start)
+        error = h * max(implicit.speed_of(p, b, late), implicit.speed_of(p, b, stopped)) / 8.0
+        error = min(error, travel)
         if error <= FINENESS * SHALLOWEST:
             continue
-        depth = _deepest(bodies, b, implicit.twist_of(bodies, b, after), h)
+        depth = _deepest(p, b, after, h)
         if depth <= 0.0:
             continue
         allowed = FINENESS * max(depth, SHALLOWEST)
@@ -93,65 +169,71 @@ def _parts(step, after, wrenches, h, first_step, solved):
 
 
 @njit
-def _rows_with(rows, inverse, mass, stiffness, reference):
-    """Constraint rows seen through another mass matrix."""
-    n, nv = rows.jacobian.shape
-    acceleration = np.zeros((n, nv))
-    for i in range(n):
-        a = dense.multiply_transposed(inverse, rows.jacobian[i])
-        b = dense.multiply_transposed(mass, a)
-        for k in range(nv):
-            acceleration[i, k] = b[k]
-    return Rows(rows.jacobian, acceleration, stiffness, reference, rows.kind, rows.bound, rows.damping, rows.spring)
+def _prepare(p, h):
+    """Set the equation's mass, rows and step for a time h."""
+    drag, plain, mass = equation.square(p, AT.drag), equation.square(p, AT.plain_mass), equation.square(p, AT.mass)
+    for i in range(mass.shape[0]):
+        for k in range(mass.shape[0]):
+            mass[i, k] = plain[i, k] + h * drag[i, k]
+    j, dragged = equation.rows_by_dofs(p, AT.row_jacobian), equation.rows_by_dofs(p, AT.row_drag)
+    seen = equation.rows_by_dofs(p, AT.row_acceleration)
+    for i in range(j.shape[0]):
+        for k in range(j.shape[1]):
+            seen[i, k] = j[i, k] + h * dragged[i, k]
+    doubles(equation.number(p, AT.step), 1)[0] = h
 
 
 @njit
-def _force_of(mass, rows, change, h, tau):
-    """The sand's force that changes the velocity so in one step."""
-    return dense.multiply(mass, change) / h - tau - implicit.constrained(rows, change, h)
+def _force_of(p, velocity, out):
+    """Fill out with the sand's force that makes MuJoCo's step end at a velocity."""
+    v, h = equation.of_dofs(p, AT.velocity), _timestep(p)
+    _prepare(p, h)
+    dense.copy(v, equation.of_dofs(p, AT.start))
+    residual, nothing = equation.step_vector(p, KEEP.four), equation.step_vector(p, KEEP.five)
+    for k in range(v.size):
+        nothing[k] = 0.0
+    dense.factor_of(equation.square(p, AT.mass), equation.square(p, AT.mass_factors), equation.order(p, AT.mass_order))
+    implicit.residual_of(p, velocity, nothing, residual)
+    for k in range(v.size):
+        out[k] = residual[k] / h
 
 
 @njit
-def is_needed(old, new, bodies, v, h):
-    """Whether the sand can act in the step; where not, the new state is filled."""
-    if old[SPLIT] > 0.0 or _is_near(bodies, v, h):
-        return True
-    for i in range(new.size):
-        new[i] = 0.0
-    new[STARTED] = 1.0
-    return False
+def _finish(p, foreseen, last, delta, after, split):
+    """Fill the new state."""
+    nb, nv, new = equation.number(p, AT.nbody), equation.number(p, AT.nv), _state(p, AT.new)
+    dense.copy(foreseen, part_of(new, 0, nv))
+    dense.copy(last, part_of(new, 1, nv))
+    for k in range(nv):
+        part_of(new, 2, nv)[k] = delta[k] - after[k]
+    dense.copy(after, part_of(new, 3, nv))
+    dense.copy(doubles(equation.number(p, AT.derivative), 36 * nb), new[HEAD + 4 * nv :])
+    new[KNOWS_FORCE], new[SPLIT] = 1.0, 1.0 if split else 0.0
+    new[KNOWS_DERIVATIVE] = doubles(equation.number(p, AT.flags), 1)[0]
 
 
 @njit
-def sand_force(old, new, bodies, rows, mass, mass_h, v, h, tau, count, wrench):
-    """The sand's generalised force of one step, (nv,).
-
-    Args:
-        old: State after the last step.
-        new: State after this one, filled.
-        bodies: The bodies in the sand; their frames are spoilt.
-        rows: Constraint rows; `acceleration` is filled in here.
-        mass: Mass matrix, (nv, nv).
-        mass_h: With what the integrator takes implicitly.
-        v: Velocity at the start, (nv,).
-        h: Length of the step [s].
-        tau: Other smooth forces, (nv,).
-        count: Evaluations, Jacobians, unsolved equations; counted up.
-        wrench: Mean wrench on each body over the step, (nbody, 6), filled.
-    """
-    nv, nb = v.size, bodies.length.size
-    inverse, frames = dense.inverse(mass), bodies.frame.copy()
-    allowed = GAIN * dense.dot(v, dense.multiply(mass, v)) + 1e-12
-    before, most_parts = old.copy(), MOST_PARTS
-    q, work, slack = np.zeros(nv), 0.0, 0.0
+def step(p):
+    """The sand's generalised force of one step: fills AT.out, AT.new and AT.wrench, and counts."""
+    nb, nv = equation.number(p, AT.nbody), equation.number(p, AT.nv)
+    before, new, v = _state(p, AT.before), _state(p, AT.new), equation.of_dofs(p, AT.velocity)
+    q, moved, h = equation.of_dofs(p, AT.out), equation.step_vector(p, KEEP.one), _timestep(p)
+    frames, first = (
+        doubles(equation.number(p, AT.frames), FRAME * nb),
+        doubles(equation.number(p, AT.first_frames), FRAME * nb),
+    )
+    dense.copy(_state(p, AT.old), before)
+    dense.copy(frames, first)
+    dense.multiply(equation.square(p, AT.plain_mass), v, moved)
+    allowed = GAIN * dense.dot(v, moved) + 1e-12
+    work, slack, most_parts = 0.0, 0.0, MOST_PARTS
     for _ in range(2):
-        for i in range(new.size):
-            new[i] = 0.0
-        new[STARTED] = 1.0
-        q = _one_step(before, new, bodies, rows, mass, inverse, mass_h, v, h, tau, most_parts, count, wrench)
+        _begin(new)
+        _one_step(p, most_parts)
         work, slack = 0.0, allowed
+        after = part_of(new, 3, nv)
         for k in range(nv):
-            work += 0.5 * h * q[k] * (v[k] + part_of(new, 3, nv)[k])
+            work += 0.5 * h * q[k] * (v[k] + after[k])
             slack += 3.0 * h * native_ahead.V_C * abs(q[k])
         if work <= slack or (before[SPLIT] == 0.0 and new[SPLIT] == 0.0):
             break
@@ -159,109 +241,141 @@ def sand_force(old, new, bodies, rows, mass, mass_h, v, h, tau, count, wrench):
         for i in range(before.size):
             before[i] = 0.0
         before[STARTED], most_parts = 1.0, 1
-        for b in range(nb):
-            _write(bodies.frame[b], frames[b])
+        dense.copy(first, frames)
     if work > slack:
         # the force's own share of the work, and the rest's: scale it until they cancel
-        own = 0.5 * h * dense.dot(q, dense.multiply(dense.inverse(mass_h), q))
+        dense.substitute(equation.square(p, AT.mass_factors), equation.order(p, AT.mass_order), q, moved)
+        own = 0.5 * h * dense.dot(q, moved)
         rest = work / h - own
         share = 0.0 if rest >= 0.0 else min(1.0, -rest / own)
         for k in range(nv):
             q[k] *= share
-        for b in range(nb):
-            for k in range(6):
-                wrench[b, k] *= share
-    return q
+        wrench = doubles(equation.number(p, AT.wrench), 6 * nb)
+        for k in range(6 * nb):
+            wrench[k] *= share
 
 
 @njit
-def _one_step(old, new, bodies, rows, mass, inverse, mass_h, v, h, tau, most_parts, count, wrench):
-    nv, nb = v.size, bodies.length.size
-    split_before = old[SPLIT] > 0.0
-    drift = old[DRIFT] if split_before else h
-    start = v + part_of(old, 2, nv) if split_before else v.copy()
-    g = np.empty((nb, 6, 6))
-    _write(g.reshape(36 * nb), old[HEAD + 4 * nv :])
-    known, foreseen = old[KNOWS_DERIVATIVE] > 0.0, old[KNOWS_FORCE] > 0.0
-    last = part_of(old, 1, nv).copy() if foreseen else v.copy()
-    rows = _rows_with(rows, inverse, mass_h, rows.stiffness, rows.reference)
-    step = Step(bodies, rows, mass_h, dense.inverse(mass_h), start, 0.5 * (drift + h), tau)
-    after, wrenches, known, solved = native_solver.solve(step, last, part_of(old, 0, nv), g, known, count)
-    parts = min(_parts(step, after, wrenches, h, old[STARTED] == 0.0, solved), most_parts)
-    if parts == 1:
-        count[2] += 0 if solved else 1
-        _write(part_of(new, 0, nv), implicit.generalised(bodies, wrenches, 6))
-        _write(part_of(new, 1, nv), after)
-        _write(part_of(new, 2, nv), np.zeros(nv))
-        _write(part_of(new, 3, nv), after)
-        _write(new[HEAD + 4 * nv :], g.reshape(36 * nb))
-        new[KNOWS_FORCE], new[KNOWS_DERIVATIVE], new[SPLIT] = 1.0, 1.0 if known else 0.0, 0.0
-        for b in range(nb):
-            for k in range(6):
-                wrench[b, k] = wrenches[b, k]
-        if not split_before:
-            return implicit.generalised(bodies, wrenches, 0)
-        return _force_of(mass_h, rows, after - v, h, tau)
-    return _split_step(old, new, step, after, mass, inverse, v, h, parts, count, wrench)
-
-
-@njit
-def _split_step(old, new, whole, after, mass, inverse, v, h, parts, count, wrench):
-    """The step in parts: kicks of half the neighbouring parts, and drifts that only the depths follow."""
-    nv, nb = v.size, whole.bodies.length.size
-    bodies, rows, mass_h, tau = whole.bodies, whole.rows, whole.mass, whole.tau
-    # contacts keep the force that the whole step gave them: MuJoCo will give them one force
-    force, active = np.empty(rows.kind.size), np.empty(rows.kind.size)
-    implicit.constraint_force(rows, after - v, h, force, active)
-    stiffness, tau = rows.stiffness.copy(), tau.copy()
-    for i in range(rows.kind.size):
-        if rows.kind[i] == CONTACT:
-            stiffness[i] = 0.0
-            tau += rows.jacobian[i] * force[i]
-    held = Rows(
-        rows.jacobian, rows.acceleration, stiffness, rows.reference, rows.kind, rows.bound, rows.damping, rows.spring
-    )
-    drag = (mass_h - mass) / h
-    kicked, foreseen, mean, moved = whole.start.copy(), np.zeros(nv), np.zeros(nv), np.zeros(nv)
-    g, known = np.zeros((nb, 6, 6)), False
-    # a velocity that was set by hand belongs to the start of the step, and MuJoCo's own to half a drift before it
-    drift = old[DRIFT] if old[SPLIT] > 0.0 else (h if old[STARTED] > 0.0 else 0.0)
-    part, done = h / parts, 0.0
+def _one_step(p, most_parts):
+    """A step from the state AT.before."""
+    nb, nv, n, h = equation.number(p, AT.nbody), equation.number(p, AT.nv), equation.number(p, AT.nrow), _timestep(p)
+    before, v, flags = _state(p, AT.before), equation.of_dofs(p, AT.velocity), doubles(equation.number(p, AT.flags), 2)
+    split_before = before[SPLIT] > 0.0
+    drift = before[DRIFT] if split_before else h
+    dense.copy(v, equation.of_dofs(p, AT.last))
+    start = equation.of_dofs(p, AT.start)
+    dense.copy(v, start)
+    if split_before:
+        delta = part_of(before, 2, nv)
+        for k in range(nv):
+            start[k] += delta[k]
+    if before[KNOWS_FORCE] > 0.0:
+        dense.copy(part_of(before, 1, nv), equation.of_dofs(p, AT.last))
+    dense.copy(part_of(before, 0, nv), equation.of_dofs(p, AT.foreseen))
+    dense.copy(before[HEAD + 4 * nv :], doubles(equation.number(p, AT.derivative), 36 * nb))
+    flags[0] = before[KNOWS_DERIVATIVE]
+    dense.copy(equation.of_dofs(p, AT.smooth_force), equation.of_dofs(p, AT.force))
+    dense.copy(doubles(equation.number(p, AT.first_stiffness), n), doubles(equation.number(p, AT.row_stiffness), n))
+    dense.copy(doubles(equation.number(p, AT.first_reference), n), doubles(equation.number(p, AT.row_reference), n))
+    _prepare(p, 0.5 * (drift + h))
+    native_solver.solve(p)
+    solved = flags[1] > 0.0
+    parts = min(_parts(p, before[STARTED] == 0.0, solved), most_parts)
+    if parts > 1:
+        _split_step(p, parts)
+        return
+    if not solved:
+        doubles(equation.number(p, AT.count), 3)[2] += 1.0
+    at, foreseen, end = equation.point(p, POINT.best), equation.step_vector(p, KEEP.six), equation.of_dofs(p, AT.end)
+    implicit.generalised(p, at, 1, foreseen)
+    _finish(p, foreseen, equation.point_vector(p, at, PART.velocity), end, end, False)
     for b in range(nb):
-        for k in range(6):
-            wrench[b, k] = 0.0
+        dense.copy(equation.point_wrench(p, at, b, 0), doubles(equation.number(p, AT.wrench) + 48 * b, 6))
+    _force_of(p, end, equation.of_dofs(p, AT.out))
+
+
+@njit
+def _hold_contacts(p):
+    """Let contacts keep the force that the whole step gave them: MuJoCo will give them one force."""
+    after = equation.point_vector(p, equation.point(p, POINT.best), PART.velocity)
+    v, change = equation.of_dofs(p, AT.velocity), equation.step_vector(p, KEEP.one)
+    for k in range(v.size):
+        change[k] = after[k] - v[k]
+    _prepare(p, _timestep(p))
+    x, force = rows.row_scratch(p, ROW.x), rows.row_scratch(p, ROW.force)
+    rows.accelerations(p, change, x)
+    rows.forces(p, x, force)
+    kind = int64s(equation.number(p, AT.row_kind), x.size)
+    stiffness = equation.of_rows(p, AT.row_stiffness)
+    for i in range(x.size):
+        if kind[i] >= KIND.contact:
+            stiffness[i] = 0.0
+        else:
+            force[i] = 0.0
+    dense.add_transposed(equation.rows_by_dofs(p, AT.row_jacobian), force, 1.0, equation.of_dofs(p, AT.force))
+
+
+@njit
+def _split_step(p, parts):
+    """The step in parts: kicks of half the neighbouring parts, and drifts that only the depths follow."""
+    nb, nv, h = equation.number(p, AT.nbody), equation.number(p, AT.nv), _timestep(p)
+    before, new, v = _state(p, AT.before), _state(p, AT.new), equation.of_dofs(p, AT.velocity)
+    kicked, foreseen, end = equation.of_dofs(p, AT.start), equation.of_dofs(p, AT.foreseen), equation.of_dofs(p, AT.end)
+    last, pushed, at = equation.of_dofs(p, AT.last), equation.of_dofs(p, AT.force), equation.point(p, POINT.best)
+    held, mean, moved = (
+        equation.step_vector(p, KEEP.two),
+        equation.step_vector(p, KEEP.three),
+        equation.step_vector(p, KEEP.four),
+    )
+    change, count = equation.step_vector(p, KEEP.five), doubles(equation.number(p, AT.count), 3)
+    flags, j = doubles(equation.number(p, AT.flags), 2), equation.rows_by_dofs(p, AT.row_jacobian)
+    reference, first = equation.of_rows(p, AT.row_reference), equation.of_rows(p, AT.first_reference)
+    damping, spring = equation.of_rows(p, AT.row_damping), equation.of_rows(p, AT.row_spring)
+    wrench = doubles(equation.number(p, AT.wrench), 6 * nb)
+    _hold_contacts(p)
+    dense.copy(pushed, held)
+    for k in range(nv):
+        foreseen[k] = mean[k] = moved[k] = 0.0
+    for k in range(6 * nb):
+        wrench[k] = 0.0
+    flags[0] = 0.0
+    # a velocity that was set by hand belongs to the start of the step, and MuJoCo's own to half a drift before it
+    drift = before[DRIFT] if before[SPLIT] > 0.0 else (h if before[STARTED] > 0.0 else 0.0)
+    part, done = h / parts, 0.0
     while done < h * (1.0 - 1e-9):
         part = min(part, h - done)
         if h - done - part < 0.3 * part:
             part = h - done
-        kick = 0.5 * (drift + part)
-        mass_k = mass + kick * drag
-        reference = rows.reference.copy()
-        for i in range(rows.kind.size):
-            reference[i] -= rows.damping[i] * dense.dot(rows.jacobian[i], kicked - v)
-            reference[i] -= rows.spring[i] * dense.dot(rows.jacobian[i], moved)
-        seen = _rows_with(rows, inverse, mass_k, stiffness, reference)
-        pushed = tau - dense.multiply(drag, kicked - v)
-        step = Step(bodies, seen, mass_k, dense.inverse(mass_k), kicked, kick, pushed)
-        after, wrenches, known, solved = native_solver.solve(step, kicked, foreseen, g, known, count)
-        if not solved:
+        _prepare(p, 0.5 * (drift + part))
+        for k in range(nv):
+            change[k] = kicked[k] - v[k]
+        for i in range(reference.size):
+            reference[i] = first[i] - damping[i] * dense.dot(j[i], change) - spring[i] * dense.dot(j[i], moved)
+        dense.multiply(equation.square(p, AT.drag), change, pushed)
+        for k in range(nv):
+            pushed[k] = held[k] - pushed[k]
+        dense.copy(kicked, last)
+        native_solver.solve(p)
+        if flags[1] == 0.0:
             if part > h / (8.0 * parts):
                 part *= 0.25
                 continue
-            count[2] += 1
-        implicit.sink(bodies, after, part)
-        foreseen = implicit.generalised(bodies, wrenches, 6)
-        mean += after * (part / h)
-        moved += after * part
+            count[2] += 1.0
+        _sink(p, end, part)
+        implicit.generalised(p, at, 1, foreseen)
+        for k in range(nv):
+            mean[k] += end[k] * (part / h)
+            moved[k] += end[k] * part
+            kicked[k] = end[k]
         for b in range(nb):
+            now = equation.point_wrench(p, at, b, 0)
             for k in range(6):
-                wrench[b, k] += wrenches[b, k] * (part / h)
-        kicked, drift, done = after, part, done + part
+                wrench[6 * b + k] += now[k] * (part / h)
+        drift, done = part, done + part
         part = min(2.0 * part, h / parts)
-    _write(part_of(new, 0, nv), foreseen)
-    _write(part_of(new, 1, nv), kicked)
-    _write(part_of(new, 2, nv), kicked - mean)
-    _write(part_of(new, 3, nv), mean)
-    _write(new[HEAD + 4 * nv :], g.reshape(36 * nb))
-    new[KNOWS_FORCE], new[KNOWS_DERIVATIVE], new[SPLIT], new[DRIFT] = 1.0, 1.0 if known else 0.0, 1.0, drift
-    return _force_of(mass_h, held, mean - v, h, tau)
+    _finish(p, foreseen, equation.point_vector(p, at, PART.velocity), kicked, mean, True)
+    new[DRIFT] = drift
+    dense.copy(held, pushed)
+    dense.copy(first, reference)
+    dense.copy(mean, last)
+    _force_of(p, last, equation.of_dofs(p, AT.out))

@@ -10,56 +10,63 @@ import mujoco
 import numpy as np
 from numba import njit
 
-from rftsim import implicit as solver
-from rftsim import native_ahead, packed, stepping
+from rftsim import dense, equation, native_ahead, native_step
 from rftsim.engine import bodies, external, instance
-from rftsim.memory import doubles, int32s, pointer
+from rftsim.equation import AT, KIND, VECTOR
+from rftsim.memory import doubles, int32s, int64s, pointer
 
 _EULER: Final = int(mujoco.mjtIntegrator.mjINT_EULER)
 _IMPLICIT: Final = int(mujoco.mjtIntegrator.mjINT_IMPLICIT)
 _UNDAMPED: Final = int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP) | int(mujoco.mjtDisableBit.mjDSBL_DAMPER)
 _KIND: Final = {
-    mujoco.mjtConstraint.mjCNSTR_EQUALITY: solver.EQUALITY,
-    mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF: solver.FRICTION,
-    mujoco.mjtConstraint.mjCNSTR_FRICTION_TENDON: solver.FRICTION,
-    mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT: solver.LIMIT,
-    mujoco.mjtConstraint.mjCNSTR_LIMIT_TENDON: solver.LIMIT,
-    mujoco.mjtConstraint.mjCNSTR_CONTACT_FRICTIONLESS: solver.CONTACT,
-    mujoco.mjtConstraint.mjCNSTR_CONTACT_PYRAMIDAL: solver.CONTACT,
-    mujoco.mjtConstraint.mjCNSTR_CONTACT_ELLIPTIC: solver.CONTACT,
+    mujoco.mjtConstraint.mjCNSTR_EQUALITY: KIND.equality,
+    mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF: KIND.friction,
+    mujoco.mjtConstraint.mjCNSTR_FRICTION_TENDON: KIND.friction,
+    mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT: KIND.limit,
+    mujoco.mjtConstraint.mjCNSTR_LIMIT_TENDON: KIND.limit,
+    mujoco.mjtConstraint.mjCNSTR_CONTACT_FRICTIONLESS: KIND.contact,
+    mujoco.mjtConstraint.mjCNSTR_CONTACT_PYRAMIDAL: KIND.contact,
+    mujoco.mjtConstraint.mjCNSTR_CONTACT_ELLIPTIC: KIND.cone,
 }
 _KINDS: Final = tuple(_KIND[key] for key in sorted(_KIND, key=int))
-_ELLIPTIC: Final = int(mujoco.mjtConstraint.mjCNSTR_CONTACT_ELLIPTIC)
 
 
 @njit
-def _mass(model, data, m, d, nv):
-    """The mass matrix, (nv, nv), from its lower triangle in rows."""
+def _fill_mass(model, data, m, d, p):
+    """The mass matrix, from its lower triangle in rows."""
+    out = equation.square(p, AT.plain_mass)
+    nv = out.shape[0]
     number = int32s(pointer(m + model.M_rownnz), nv)
     start = int32s(pointer(m + model.M_rowadr), nv)
     total = start[nv - 1] + number[nv - 1]
     column = int32s(pointer(m + model.M_colind), total)
     value = doubles(pointer(d + data.M), total)
-    out = np.zeros((nv, nv))
+    for i in range(nv):
+        for k in range(nv):
+            out[i, k] = 0.0
     for i in range(nv):
         for k in range(start[i], start[i] + number[i]):
             out[i, column[k]] = value[k]
             out[column[k], i] = value[k]
-    return out
 
 
 @njit
-def _mass_of_integrator(model, data, m, d, mass, h):
-    """The mass matrix with what the integrator takes implicitly."""
-    nv = mass.shape[0]
-    out = mass.copy()
+def _fill_drag(model, data, m, d, p):
+    """What the integrator takes implicitly, over the time step; whether there is any."""
+    out = equation.square(p, AT.drag)
+    nv = out.shape[0]
+    for i in range(nv):
+        for k in range(nv):
+            out[i, k] = 0.0
     integrator = int32s(m + model.opt_integrator, 1)[0]
     if integrator == _EULER:
+        found = False
         if int32s(m + model.opt_disableflags, 1)[0] & _UNDAMPED == 0:
             damping = doubles(pointer(m + model.dof_damping), nv)
             for i in range(nv):
-                out[i, i] += h * damping[i]
-        return out
+                out[i, i] = damping[i]
+                found = found or damping[i] != 0.0
+        return found
     external.smooth_vel(m, d, 1 if integrator == _IMPLICIT else 0)
     number = int32s(pointer(m + model.D_rownnz), nv)
     start = int32s(pointer(m + model.D_rowadr), nv)
@@ -70,20 +77,20 @@ def _mass_of_integrator(model, data, m, d, mass, h):
         for k in range(start[i], start[i] + number[i]):
             j = column[k]
             if integrator == _IMPLICIT or j == i:
-                out[i, j] -= h * value[k]
+                out[i, j] = -value[k]
             elif j < i:  # implicitfast takes the lower triangle for both
-                out[i, j] -= h * value[k]
-                out[j, i] -= h * value[k]
-    return out
+                out[i, j] = out[j, i] = -value[k]
+    return True
 
 
 @njit
-def _driving_force(model, data, m, d, t, nv):
-    """All smooth forces of this step but the sand's, (nv,)."""
+def _fill_force(model, data, m, d, t, p):
+    """All smooth forces of this step but the sand's."""
     external.fwd_actuation(m, d)
     bias = pointer(d + data.qfrc_bias)
     external.rne(m, d, 0, bias)
-    out = np.empty(nv)
+    out = equation.of_dofs(p, AT.smooth_force)
+    nv = out.size
     passive, actuator = doubles(pointer(d + data.qfrc_passive), nv), doubles(pointer(d + data.qfrc_actuator), nv)
     applied, weight = doubles(pointer(d + data.qfrc_applied), nv), doubles(bias, nv)
     for i in range(nv):
@@ -98,98 +105,123 @@ def _driving_force(model, data, m, d, t, nv):
         if any_force:
             x = at[3 * body : 3 * body + 3]
             bodies.add_wrench(t, body, x, (f[0], f[1], f[2]), (f[3], f[4], f[5]), out)
-    return out
 
 
 @njit
-def _constraints(model, data, m, d, nv):
-    """MuJoCo's constraint rows. The friction of elliptic contacts is not foreseen."""
-    n = int32s(d + data.nefc, 1)[0]
-    jacobian, kind = np.zeros((n, nv)), np.zeros(n, np.int64)
-    stiffness, reference, bound = np.zeros(n), np.zeros(n), np.zeros(n)
-    damping, spring = np.zeros(n), np.zeros(n)
-    if n > 0:
-        external.reference_constraint(m, d)
-        kinds, owner = int32s(pointer(d + data.efc_type), n), int32s(pointer(d + data.efc_id), n)
-        d_, aref = doubles(pointer(d + data.efc_D), n), doubles(pointer(d + data.efc_aref), n)
-        loss, kbip = doubles(pointer(d + data.efc_frictionloss), n), doubles(pointer(d + data.efc_KBIP), 4 * n)
-        if external.is_sparse(m):
-            number = int32s(pointer(d + data.efc_J_rownnz), n)
-            start = int32s(pointer(d + data.efc_J_rowadr), n)
-            total = start[n - 1] + number[n - 1]
-            column, value = int32s(pointer(d + data.efc_J_colind), total), doubles(pointer(d + data.efc_J), total)
-            for i in range(n):
-                for k in range(start[i], start[i] + number[i]):
-                    jacobian[i, column[k]] = value[k]
-        else:
-            value = doubles(pointer(d + data.efc_J), n * nv)
-            for i in range(n):
-                for k in range(nv):
-                    jacobian[i, k] = value[i * nv + k]
+def _fill_rows(model, data, contact, m, d, p, dragged):
+    """MuJoCo's constraint rows."""
+    n, nv = equation.number(p, AT.nrow), equation.number(p, AT.nv)
+    if n == 0:
+        return
+    external.reference_constraint(m, d)
+    kind, bound = int64s(equation.number(p, AT.row_kind), n), equation.of_rows(p, AT.row_bound)
+    damping, spring = equation.of_rows(p, AT.row_damping), equation.of_rows(p, AT.row_spring)
+    kinds, owner = int32s(pointer(d + data.efc_type), n), int32s(pointer(d + data.efc_id), n)
+    dense.copy(doubles(pointer(d + data.efc_D), n), equation.of_rows(p, AT.first_stiffness))
+    dense.copy(doubles(pointer(d + data.efc_aref), n), equation.of_rows(p, AT.first_reference))
+    loss, kbip = doubles(pointer(d + data.efc_frictionloss), n), doubles(pointer(d + data.efc_KBIP), 4 * n)
+    jacobian = equation.rows_by_dofs(p, AT.row_jacobian)
+    if external.is_sparse(m):
         for i in range(n):
-            kind[i], bound[i] = _KINDS[kinds[i]], loss[i]
-            stiffness[i], reference[i] = d_[i], aref[i]
-            damping[i], spring[i] = kbip[4 * i + 1], kbip[4 * i] * kbip[4 * i + 2]
-            if kinds[i] == _ELLIPTIC and i > 0 and kinds[i - 1] == _ELLIPTIC and owner[i] == owner[i - 1]:
-                stiffness[i] = 0.0
-    return solver.Rows(jacobian, jacobian, stiffness, reference, kind, bound, damping, spring)
+            for k in range(nv):
+                jacobian[i, k] = 0.0
+        number = int32s(pointer(d + data.efc_J_rownnz), n)
+        start = int32s(pointer(d + data.efc_J_rowadr), n)
+        total = start[n - 1] + number[n - 1]
+        column, value = int32s(pointer(d + data.efc_J_colind), total), doubles(pointer(d + data.efc_J), total)
+        for i in range(n):
+            for k in range(start[i], start[i] + number[i]):
+                jacobian[i, column[k]] = value[k]
+    else:
+        value = doubles(pointer(d + data.efc_J), n * nv)
+        for i in range(n):
+            for k in range(nv):
+                jacobian[i, k] = value[i * nv + k]
+    inside = 0  # rows of the elliptic contact at hand
+    for i in range(n):
+        kind[i], bound[i] = _KINDS[kinds[i]], loss[i]
+        damping[i], spring[i] = kbip[4 * i + 1], kbip[4 * i] * kbip[4 * i + 2]
+        if kind[i] == KIND.cone:
+            inside = inside + 1 if i > 0 and kinds[i - 1] == kinds[i] and owner[i - 1] == owner[i] else 0
+            at = pointer(d + data.contact) + contact.size * owner[i]
+            if inside == 0:
+                bound[i] = doubles(at + contact.mu, 1)[0]
+            else:
+                kind[i] = KIND.tangent
+                bound[i] = doubles(at + contact.friction, 5)[inside - 1]
+    seen = equation.rows_by_dofs(p, AT.row_drag)
+    if not dragged:
+        for i in range(n):
+            for k in range(nv):
+                seen[i, k] = 0.0
+        return
+    lu, order = equation.square(p, AT.mass_factors), equation.order(p, AT.mass_order)
+    dense.factor_of(equation.square(p, AT.plain_mass), lu, order)
+    solved, drag = equation.vector(p, VECTOR.change), equation.square(p, AT.drag)
+    for i in range(n):
+        dense.substitute(lu, order, jacobian[i], solved)
+        for k in range(nv):
+            seen[i, k] = 0.0
+        dense.add_transposed(drag, solved, 1.0, seen[i])
 
 
 @njit
-def _bodies_of(model, m, t, table, sand, nv):
-    """The bodies of the instance, for one step."""
-    n = table[0]
-    jacobian, rotation = np.empty((n, 6, nv)), np.empty((n, 9))
-    frame, length, surface = np.empty((n, native_ahead.FRAME)), np.empty(n), np.empty((n, 2), np.int64)
-    v, w = np.empty(3), np.empty(3)
+def _fill_bodies(model, m, t, table, p):
+    """The bodies of the instance."""
+    n, v, w = table[0], np.empty(3), np.empty(3)
+    numerics = int32s(pointer(m + model.numeric_adr), pointer(m + model.nnumeric))
+    first = pointer(m + model.numeric_data)
+    lengths, surfaces = (
+        doubles(equation.number(p, AT.length), n),
+        int64s(equation.number(p, AT.surface), n),
+    )
+    sand = first + instance.SIZE * numerics[table[1]]
+    int64s(p, equation.ENTRIES)[AT.sand] = sand
     for k in range(n):
         body, field = table[instance.HEAD + 2 * k], table[instance.HEAD + 2 * k + 1]
-        numbers = instance.numeric(model, m, field)
-        surface[k, 0] = (
-            pointer(m + model.numeric_data)
-            + instance.SIZE * (int32s(pointer(m + model.numeric_adr), pointer(m + model.nnumeric))[field])
-        )
-        surface[k, 1] = packed.size_of(numbers)
-        length[k] = numbers[15]
-        bodies.jacobian(t, body, jacobian[k])
-        for i in range(9):
-            rotation[k, i] = t.xmat[9 * body + i]
-        x = t.xpos[3 * body : 3 * body + 3].ctypes.data
+        surfaces[k] = first + instance.SIZE * numerics[field]
+        lengths[k] = doubles(surfaces[k], 16)[15]
+        bodies.jacobian(t, body, equation.body_jacobian(p, k))
+        r, f = equation.body_rotation(p, k), equation.body_frame(p, k)
+        dense.copy(t.xmat[9 * body : 9 * body + 9], r)
         bodies.twist(t, body, v, w)
-        r, f = rotation[k].ctypes.data, frame[k].ctypes.data
-        native_ahead.frame(sand.ctypes.data, surface[k, 0], x, r, v.ctypes.data, w.ctypes.data, f)
-    return solver.Bodies(jacobian, rotation, frame, length, surface, sand)
+        x = t.xpos[3 * body : 3 * body + 3].ctypes.data
+        native_ahead.frame(sand, surfaces[k], x, r.ctypes.data, v.ctypes.data, w.ctypes.data, f.ctypes.data)
+        v[0] = w[0] = 0.0  # used after the call
 
 
 @njit
-def press(model, data, m, d, number):
+def press(model, data, contact, m, d, number):
     """Solve for the sand's force at the end of the step and add it to qfrc_passive."""
     address = instance.block_of(model, data, m, d, number)
     table = instance.table(address)
-    sand = instance.numeric(model, m, table[1])
-    nv = pointer(m + model.nv)
-    t = bodies.tree(model, data, m, d)
-    own = _bodies_of(model, m, t, table, sand, nv)
-    v = doubles(pointer(d + data.qvel), nv).copy()
-    h = doubles(m + model.opt_timestep, 1)[0]
+    nv, nbody = pointer(m + model.nv), table[0]
     old = instance.lasting(model, data, m, d, number)
     new = instance.pending(address, old.size)
-    counted = instance.counters(address)
-    wrenches = instance.wrenches(address)
+    counted, wrenches = instance.counters(address), instance.wrenches(address)
     for i in range(wrenches.size):
         wrenches[i] = 0.0
     counted[0] = counted[1] = counted[2] = 0.0
-    if not stepping.is_needed(old, new, own, v, h):
-        return
-    mass = _mass(model, data, m, d, nv)
-    mass_h = _mass_of_integrator(model, data, m, d, mass, h)
-    tau = _driving_force(model, data, m, d, t, nv)
-    rows = _constraints(model, data, m, d, nv)
-    mean = np.zeros((table[0], 6))
-    q = stepping.sand_force(old, new, own, rows, mass, mass_h, v, h, tau, counted, mean)
-    force = doubles(pointer(d + data.qfrc_passive), nv)
-    for i in range(nv):
-        force[i] += q[i]
-    for k in range(table[0]):
-        for i in range(6):
-            wrenches[instance.WRENCH * k + i] = mean[k, i]
+    rows = int32s(d + data.nefc, 1)[0]
+    entries = np.empty(equation.ENTRIES, np.int64)
+    p = entries.ctypes.data
+    memory = np.empty(equation.lay_out(p, 0, nbody, nv, rows, old.size) // 8)
+    equation.lay_out(p, memory.ctypes.data, nbody, nv, rows, old.size)
+    entries[AT.old], entries[AT.new] = old.ctypes.data, new.ctypes.data
+    entries[AT.count] = counted.ctypes.data
+    dense.copy(doubles(pointer(d + data.qvel), nv), equation.of_dofs(p, AT.velocity))
+    doubles(entries[AT.timestep], 1)[0] = doubles(m + model.opt_timestep, 1)[0]
+    t = bodies.tree(model, data, m, d)
+    _fill_bodies(model, m, t, table, p)
+    if native_step.is_needed(p) != 0:
+        _fill_mass(model, data, m, d, p)
+        dragged = _fill_drag(model, data, m, d, p)
+        _fill_force(model, data, m, d, t, p)
+        _fill_rows(model, data, contact, m, d, p, dragged)
+        native_step.step(p)
+        force = doubles(pointer(d + data.qfrc_passive), nv)
+        q = equation.of_dofs(p, AT.out)
+        for i in range(nv):
+            force[i] += q[i]
+        dense.copy(doubles(entries[AT.wrench], wrenches.size), wrenches)
+    entries[0] = memory.size  # both live until here

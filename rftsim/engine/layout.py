@@ -76,6 +76,7 @@ class Data(NamedTuple):
     """Byte offsets in mjData."""
 
     nefc: int
+    contact: int
     plugin_data: int
     plugin_state: int
     qvel: int
@@ -105,6 +106,14 @@ class Data(NamedTuple):
     sensordata: int
 
 
+class Contact(NamedTuple):
+    """Byte offsets in mjContact, and its size."""
+
+    mu: int
+    friction: int
+    size: int
+
+
 def _ctype(node: Any) -> Any:
     if isinstance(node, ast_nodes.PointerType):
         return ctypes.c_void_p
@@ -132,7 +141,8 @@ def _struct(name: str) -> type[ctypes.Structure]:
 
 _PROBE = """
 <mujoco>
-  <worldbody><body><joint limited="true" range="10 20" damping="1" frictionloss="1"/><geom size="1"/></body></worldbody>
+  <worldbody><body><joint limited="true" range="10 20" damping="1" frictionloss="1"/><geom size="1"/></body>
+    <geom type="plane" size="1 1 1"/></worldbody>
   <option jacobian="sparse"/>
   <custom><numeric name="n" data="1 2"/></custom>
   <sensor><clock name="clock"/></sensor>
@@ -141,7 +151,7 @@ _PROBE = """
 
 
 @functools.cache
-def layout() -> tuple[Model, Data]:
+def layout() -> tuple[Model, Data, Contact]:
     """The offsets, verified.
 
     Raises:
@@ -155,7 +165,11 @@ def layout() -> tuple[Model, Data]:
     mujoco.mj_forward(model, data)
     _verify(model, model_struct.from_address(model._address), Model._fields)
     _verify(data, data_struct.from_address(data._address), Data._fields)
-    return model_offsets, data_offsets
+    contact = _struct("mjContact")
+    memory = contact.from_address(data_struct.from_address(data._address).contact)
+    if data.ncon != 1 or list(memory.friction) != data.contact.friction[0].tolist() or memory.mu != data.contact.mu[0]:
+        raise LayoutError(f"MuJoCo {mujoco.__version__} lays out contacts otherwise than it says")
+    return model_offsets, data_offsets, Contact(contact.mu.offset, contact.friction.offset, ctypes.sizeof(contact))
 
 
 def _offset(struct: type[ctypes.Structure], name: str) -> int:

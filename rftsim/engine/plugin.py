@@ -103,7 +103,7 @@ def _make_explicit(model: layout.Model, data: layout.Data, source: str) -> tuple
     return nstate, compute
 
 
-def _make_implicit(model: layout.Model, data: layout.Data, source: str) -> tuple[Any, ...]:
+def _make_implicit(model: layout.Model, data: layout.Data, contact: layout.Contact, source: str) -> tuple[Any, ...]:
     from rftsim.engine import implicit  # compiles for minutes where it is not cached
 
     @cfunc(types.intc(types.intp, types.intc), cache=True)
@@ -117,7 +117,7 @@ def _make_implicit(model: layout.Model, data: layout.Data, source: str) -> tuple
         elif int32s(m + model.opt_integrator, 1)[0] == _RK4:
             explicit.press(model, data, m, d, number)
         else:
-            implicit.press(model, data, m, d, number)
+            implicit.press(model, data, contact, m, d, number)
 
     return nstate, compute
 
@@ -171,9 +171,11 @@ def register(name: str) -> int:
     if memory.raw[:size].strip(b"\0") or memory.raw[size : size + 8] != b"\xff" * 8:
         raise layout.LayoutError(f"MuJoCo {mujoco.__version__} has another mjpPlugin; rftsim needs mujoco>=3.17,<4")
     link(library)
-    make_compute = {EXPLICIT: _make_explicit, IMPLICIT: _make_implicit}[name]
-    offsets = layout.layout()
-    callbacks = (*_make(*offsets, SOURCE), *make_compute(*offsets, SOURCE))
+    model, data, contact = layout.layout()
+    if name == EXPLICIT:
+        callbacks = (*_make(model, data, SOURCE), *_make_explicit(model, data, SOURCE))
+    else:
+        callbacks = (*_make(model, data, SOURCE), *_make_implicit(model, data, contact, SOURCE))
     plugin = _Plugin.from_buffer(memory)
     plugin.name = name.encode()
     bits = mujoco.mjtPluginCapabilityBit
