@@ -31,7 +31,7 @@ MOST: Final = 40
 """Iterations of one solution."""
 LOOSEST: Final = 20.0
 """Factor to which the tolerance is loosened, from the sixth iteration on."""
-CENTRED: Final = 2e-3
+CENTRED: Final = 3e-3
 """Effect of the force's change within a step on a body's velocity, relative, from which on it is counted."""
 NEAR: Final = 0.25
 """Square of the share of a body's speed that is left where a step is said to pass its rest."""

@@ -8,7 +8,7 @@ The sums carry `fastmath` without its NaN and infinity flags: reordering is what
 must stay one.
 """
 
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -329,92 +329,98 @@ STEP_ASIDE = 1e-7
 """Turn of the direction of motion [rad] by which the laws are differentiated."""
 
 
-def _jacobians(stress: Any) -> Any:
-    @njit(fastmath=FASTMATH, error_model="numpy", forceinline=True)
-    def stiffness(cx, cy, cz, nx, ny, nz, area, first, last, frame, medium, v_c, completed, k):
-        """Derivative of each triangle's force by its velocity: nine runs of BLOCK in k.
+_JACOBIAN: Final = 9
+"""Numbers of a triangle's derivative, which lie in a jacobian's scratch before the triangles' columns."""
+SCRATCH: Final = (_JACOBIAN + 7) * BLOCK
+"""Numbers of a jacobian's scratch."""
 
-        One array, and at most BLOCK triangles: LLVM gives up on telling more arrays apart.
+
+def _jacobians(stress: Any) -> Any:
+    @njit(fastmath=FASTMATH, error_model="numpy")
+    def stiffness(frame, medium, v_c, completed, k):
+        """Derivative of each triangle's force by its velocity: nine runs of BLOCK in k, before the triangles' columns.
+
+        One array and BLOCK triangles, always: LLVM gives up on telling more arrays apart.
         """
         v0x, v0y, v0z = frame.v0
         wx, wy, wz = frame.omega
-        for i in range(last - first):
-            t = first + i
-            x, y, z = cx[t], cy[t], cz[t]
-            n0, n1, n2 = nx[t], ny[t], nz[t]
+        # the completed derivative takes the leading-edge rule apart
+        bare = Medium(medium.xi, medium.mu_surf, medium.lambda_rho, medium.edge_on, (1.0 - completed) * medium.ramp)
+        for i in range(BLOCK):
+            x, y, z = k[i + 9 * BLOCK], k[i + 10 * BLOCK], k[i + 11 * BLOCK]
+            n0, n1, n2, area = k[i + 12 * BLOCK], k[i + 13 * BLOCK], k[i + 14 * BLOCK], k[i + 15 * BLOCK]
             vx = v0x + wy * z - wz * y
             vy = v0y + wz * x - wx * z
             vz = v0z + wx * y - wy * x
             speed2 = vx * vx + vy * vy + vz * vz
-            inverse = 1.0 / np.sqrt(speed2 + TINY)
+            speed = np.sqrt(speed2 + TINY)
+            inverse = 1.0 / speed
             a, b, c = vx * inverse, vy * inverse, vz * inverse
             sign = 1.0 if c >= 0.0 else -1.0  # two directions across the motion, without a branch
             turn = -1.0 / (sign + c)
             p0, p1, p2 = 1.0 + sign * a * a * turn, sign * a * b * turn, -sign * a
             q0, q1, q2 = a * b * turn, sign + b * b * turn, -b
             d = STEP_ASIDE
-            # the completed derivative takes the leading-edge rule apart: see below
-            bare = Medium(medium.xi, medium.mu_surf, medium.lambda_rho, medium.edge_on, (1.0 - completed) * medium.ramp)
-            s0, s1, s2, inertia, i0, i1, i2 = stress(n0, n1, n2, vx, vy, vz, frame, bare)
+            s0, s1, s2, inertia, m0, m1, m2 = stress(n0, n1, n2, vx, vy, vz, frame, bare)
             e0, e1, e2, _, _, _, _ = stress(n0, n1, n2, a + d * p0, b + d * p1, c + d * p2, frame, bare)
             f0, f1, f2, _, _, _, _ = stress(n0, n1, n2, a + d * q0, b + d * q1, c + d * q2, frame, bare)
             depth = _depth(x, y, z, frame)
             radius = 1.0 / np.sqrt(speed2 + v_c * v_c + TINY)
-            weight = area[t] * larger(depth, 0.0) * radius if speed2 > 0.0 else 0.0
-            # |n.v| changes sign at an edge: P (1 + sign) / 2, by the secant 1 / |n.v| of the sign
-            vn = vx * i0 + vy * i1 + vz * i2
+            weight = area * larger(depth, 0.0) * radius if speed2 > 0.0 else 0.0
+            vn = vx * m0 + vy * m1 + vz * m2
             share = completed * _leading(vn * inverse, speed2, medium) + (1.0 - completed)
-            half = 0.5 / (radius * medium.ramp)
-            edge = -0.5 * completed * abs(s0 * i0 + s1 * i1 + s2 * i2) / larger(abs(vn + half), half)
-            edge *= weight * np.sqrt(speed2 + TINY)
-            j0, j1, j2 = i0, i1, i2
-            i0, i1, i2 = inertia * i0, inertia * i1, inertia * i2
-            along = weight * (completed + (1.0 - completed) * v_c * v_c * radius * radius)
+            # a face's pressure P (1 + sign n.v) / 2 jumps at its edge: 1 / |n.v| is the secant of that sign
+            ramp = 0.5 / (radius * medium.ramp)
+            edge = -0.5 * completed * abs(s0 * m0 + s1 * m1 + s2 * m2) / larger(abs(vn + ramp), ramp) * weight * speed
+            i0, i1, i2 = inertia * m0, inertia * m1, inertia * m2
+            along = share * weight * (completed + (1.0 - completed) * v_c * v_c * radius * radius)
             across = share * weight / d
-            along *= share
-            brake = (2.0 * area[t] if depth > 0.0 else 0.0) / smaller(vx * i0 + vy * i1 + vz * i2, -TINY)
+            brake = (2.0 * area if depth > 0.0 else 0.0) / smaller(vx * i0 + vy * i1 + vz * i2, -TINY)
             e0, e1, e2 = across * (e0 - s0), across * (e1 - s1), across * (e2 - s2)
             f0, f1, f2 = across * (f0 - s0), across * (f1 - s1), across * (f2 - s2)
-            k[i] = e0 * p0 + f0 * q0 + along * s0 * a + brake * i0 * i0 + edge * j0 * j0
-            k[i + 1 * BLOCK] = e0 * p1 + f0 * q1 + along * s0 * b + brake * i0 * i1 + edge * j0 * j1
-            k[i + 2 * BLOCK] = e0 * p2 + f0 * q2 + along * s0 * c + brake * i0 * i2 + edge * j0 * j2
-            k[i + 3 * BLOCK] = e1 * p0 + f1 * q0 + along * s1 * a + brake * i1 * i0 + edge * j1 * j0
-            k[i + 4 * BLOCK] = e1 * p1 + f1 * q1 + along * s1 * b + brake * i1 * i1 + edge * j1 * j1
-            k[i + 5 * BLOCK] = e1 * p2 + f1 * q2 + along * s1 * c + brake * i1 * i2 + edge * j1 * j2
-            k[i + 6 * BLOCK] = e2 * p0 + f2 * q0 + along * s2 * a + brake * i2 * i0 + edge * j2 * j0
-            k[i + 7 * BLOCK] = e2 * p1 + f2 * q1 + along * s2 * b + brake * i2 * i1 + edge * j2 * j1
-            k[i + 8 * BLOCK] = e2 * p2 + f2 * q2 + along * s2 * c + brake * i2 * i2 + edge * j2 * j2
+            k[i] = e0 * p0 + f0 * q0 + along * s0 * a + brake * i0 * i0 + edge * m0 * m0
+            k[i + 1 * BLOCK] = e0 * p1 + f0 * q1 + along * s0 * b + brake * i0 * i1 + edge * m0 * m1
+            k[i + 2 * BLOCK] = e0 * p2 + f0 * q2 + along * s0 * c + brake * i0 * i2 + edge * m0 * m2
+            k[i + 3 * BLOCK] = e1 * p0 + f1 * q0 + along * s1 * a + brake * i1 * i0 + edge * m1 * m0
+            k[i + 4 * BLOCK] = e1 * p1 + f1 * q1 + along * s1 * b + brake * i1 * i1 + edge * m1 * m1
+            k[i + 5 * BLOCK] = e1 * p2 + f1 * q2 + along * s1 * c + brake * i1 * i2 + edge * m1 * m2
+            k[i + 6 * BLOCK] = e2 * p0 + f2 * q0 + along * s2 * a + brake * i2 * i0 + edge * m2 * m0
+            k[i + 7 * BLOCK] = e2 * p1 + f2 * q1 + along * s2 * b + brake * i2 * i1 + edge * m2 * m1
+            k[i + 8 * BLOCK] = e2 * p2 + f2 * q2 + along * s2 * c + brake * i2 * i2 + edge * m2 * m2
 
-    @njit(fastmath=FASTMATH, error_model="numpy", forceinline=True)
-    def jacobian(cx, cy, cz, nx, ny, nz, area, first, last, frame, medium, v_c, completed, scratch, out):
+    @njit(fastmath=FASTMATH, error_model="numpy")
+    def jacobian(frame, medium, v_c, completed, scratch, out):
         """Add the derivative of `sums_ahead`'s force and moment by the body's twist to out, (6, 6).
 
         A law depends on the direction of motion alone but for the scale at rest and the inertial term, so two
-        differences across the motion and those two closed forms give all of it. `completed` (0 or 1) replaces the
-        scale's derivative v_c^2 / r^3 by 1 / r, r^2 = |v|^2 + v_c^2: tangent across the motion and secant along it.
-        At most BLOCK triangles; `scratch` is (9 * BLOCK,).
+        differences across the motion and those two closed forms give all of it.
+
+        `completed` (0 or 1) asks for a matrix that does not overshoot where the law jumps: tangent across the motion and
+        secant along it (1 / r instead of v_c^2 / r^3, r^2 = |v|^2 + v_c^2), and secant where a face's edge leads.
+
+        The BLOCK triangles' columns lie in `scratch`, (SCRATCH,), from `COLUMNS_AT` on.
         """
-        stiffness(cx, cy, cz, nx, ny, nz, area, first, last, frame, medium, v_c, completed, scratch)
+        stiffness(frame, medium, v_c, completed, scratch)
         for row in range(3):
-            start = 3 * row * BLOCK
-            a = scratch[start : start + BLOCK]
-            b = scratch[start + BLOCK : start + 2 * BLOCK]
-            c = scratch[start + 2 * BLOCK : start + 3 * BLOCK]
-            _add_rows(cx, cy, cz, first, last, a, b, c, row, out)
+            _add_rows(scratch, row, out)
 
     return jacobian
 
 
-@njit(fastmath=FASTMATH, error_model="numpy", forceinline=True)
-def _add_rows(cx, cy, cz, first, last, a, b, c, row, out):
-    """Add the share of one component of the triangles' forces, whose derivatives are (a, b, c), to out, (6, 6)."""
+COLUMNS_AT: Final = _JACOBIAN * BLOCK
+
+
+@njit(fastmath=FASTMATH, error_model="numpy")
+def _add_rows(k, row, out):
+    """Add the share of one component of the triangles' forces to out, (6, 6); k is a jacobian's scratch."""
     f0 = f1 = f2 = f3 = f4 = f5 = 0.0
     x0 = x1 = x2 = x3 = x4 = x5 = 0.0
     y0 = y1 = y2 = y3 = y4 = y5 = 0.0
     z0 = z1 = z2 = z3 = z4 = z5 = 0.0
-    for i in range(last - first):
-        x, y, z = cx[first + i], cy[first + i], cz[first + i]
-        u, v, w = a[i], b[i], c[i]
+    start = 3 * row * BLOCK
+    for i in range(BLOCK):
+        x, y, z = k[i + 9 * BLOCK], k[i + 10 * BLOCK], k[i + 11 * BLOCK]
+        u, v, w = k[start + i], k[start + i + BLOCK], k[start + i + 2 * BLOCK]
         p, q, r = w * y - v * z, u * z - w * x, v * x - u * y  # by the angular velocity: velocity is omega x r
         f0, f1, f2, f3, f4, f5 = f0 + u, f1 + v, f2 + w, f3 + p, f4 + q, f5 + r
         x0, x1, x2, x3, x4, x5 = x0 + x * u, x1 + x * v, x2 + x * w, x3 + x * p, x4 + x * q, x5 + x * r
@@ -423,10 +429,10 @@ def _add_rows(cx, cy, cz, first, last, a, b, c, row, out):
     force = (f0, f1, f2, f3, f4, f5)
     arms = ((x0, x1, x2, x3, x4, x5), (y0, y1, y2, y3, y4, y5), (z0, z1, z2, z3, z4, z5))
     after, before = (row + 1) % 3, (row + 2) % 3
-    for k in range(6):
-        out[row, k] += force[k]
-        out[3 + after, k] += arms[before][k]
-        out[3 + before, k] -= arms[after][k]
+    for c in range(6):
+        out[row, c] += force[c]
+        out[3 + after, c] += arms[before][c]
+        out[3 + before, c] -= arms[after][c]
 
 
 _stress_3d_cubic = _stress_3d(cubic, _C3)

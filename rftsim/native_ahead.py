@@ -17,7 +17,7 @@ FRAME: Final = 15
 """Numbers that fix a body's frame for a step: up, rise, forward, height, rear (4), drop."""
 RAMP: Final = 100.0
 """Steepness of the leading-edge rule in the implicit force: faces fall out between n.v_hat = 0 and -1/RAMP."""
-V_C: Final = 1e-6
+V_C: Final = 3e-7
 """Speed below which a triangle's stress falls to zero in the implicit force [m/s]; bodies at rest creep slower."""
 
 _address = types.intp
@@ -99,19 +99,22 @@ def _make(source: str) -> dict[str, Any]:
         """Derivative of `rftsim_ahead`'s present wrench by the twist, world frame, (6, 6)."""
         s, body, r = doubles(sand, packed.SAND_SIZE), surface_at(surface), doubles(xmat, 9)
         f, medium = _moving_frame(doubles(frame, FRAME), r, doubles(twist, 6)), _soft_medium(s, body)
-        cx, cy, cz, nx, ny, nz, area = packed.columns(body)
-        scratch, local, turned = np.empty(9 * kernels.BLOCK), np.zeros((6, 6)), np.empty((6, 6))
-        for first in range(0, area.size if source else 0, kernels.BLOCK):
+        count = int(body[14]) if source else 0
+        scratch, local, turned = np.empty(kernels.SCRATCH), np.zeros((6, 6)), np.empty((6, 6))
+        for first in range(0, count, kernels.BLOCK):
             if packed.block_is_clear(body, first // kernels.BLOCK, f, 0.0):
                 continue
-            last = min(first + kernels.BLOCK, area.size)
-            a = (cx, cy, cz, nx, ny, nz, area)
+            for column in range(packed.COLUMNS):
+                start = packed.HEADER + column * count + first
+                for i in range(kernels.BLOCK):  # past the last triangle, ones without area
+                    value = body[start + i] if first + i < count else 0.0
+                    scratch[kernels.COLUMNS_AT + column * kernels.BLOCK + i] = value
             if s[0] == 0.0:
-                kernels.jacobian_2d(*a, first, last, f, medium, V_C, completed, scratch, local)
+                kernels.jacobian_2d(f, medium, V_C, completed, scratch, local)
             elif s[0] == 1.0:
-                kernels.jacobian_3d(*a, first, last, f, medium, V_C, completed, scratch, local)
+                kernels.jacobian_3d(f, medium, V_C, completed, scratch, local)
             else:
-                kernels.jacobian_3d_quartic(*a, first, last, f, medium, V_C, completed, scratch, local)
+                kernels.jacobian_3d_quartic(f, medium, V_C, completed, scratch, local)
         g = doubles(out, 36).reshape(6, 6)
         for half in range(0, 6, 3):  # R G R'
             for k in range(6):

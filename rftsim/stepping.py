@@ -120,17 +120,12 @@ def _deepest(p, b, v, h):
     cx, cy, cz, _, _, _, area = packed.columns(surface)
     frame, found = implicit.frame_at(p, b, twist), -1e30
     for _ in range(2):
-        found = max(found, kernels.deepest(cx, cy, cz, 0, area.size, frame))
-        frame = kernels.Frame(
-            frame.v0,
-            frame.omega,
-            frame.up,
-            _turned(frame, h),
-            frame.forward,
-            _lowered(frame, h),
-            frame.rear,
-            frame.drop,
-        )
+        last = 0
+        while last < area.size:
+            first, last = packed.next_run(surface, last, area.size, frame, 0.0)
+            found = max(found, kernels.deepest(cx, cy, cz, first, last, frame))
+        turned, lowered = _turned(frame, h), _lowered(frame, h)
+        frame = kernels.Frame(frame.v0, frame.omega, frame.up, turned, frame.forward, lowered, frame.rear, frame.drop)
     return found
 
 
