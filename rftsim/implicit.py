@@ -422,8 +422,16 @@ def centre(p):
     for k in range(v.size):
         difference[k] = h * (difference[k] - mean[k])
     _filter(p, difference, solved)
+    share = 0.0
     for k in range(v.size):
-        end[k] += solved[k]
+        mean[k] = v[k] - start[k]
+    dense.multiply(equation.square(p, AT.mass), mean, difference)
+    largest = dense.dot(mean, difference)
+    dense.multiply(equation.square(p, AT.mass), solved, difference)
+    if dense.dot(solved, difference) <= 0.25 * largest:  # else the derivative is not to be trusted
+        share = 1.0
+    for k in range(v.size):
+        end[k] += share * solved[k]
 
 
 @njit

@@ -24,7 +24,7 @@ FINENESS: Final = 5e-3
 SHALLOWEST: Final = 1e-4
 """Depth [m] below which none is resolved."""
 MOST_PARTS: Final = 256
-GAIN: Final = 1e-4
+GAIN: Final = 1e-7
 """Work that the sand may do in a step over the kinetic energy: rounding, not physics, and more is taken back."""
 FALL: Final = 30.0
 """Acceleration that bodies are watched for on their way to the sand [m/s^2]."""
@@ -194,6 +194,27 @@ def _force_of(p, velocity, out):
 
 
 @njit
+def _reset(p):
+    """Set the equation to the whole step from MuJoCo's own velocity."""
+    n = equation.number(p, AT.nrow)
+    dense.copy(equation.of_dofs(p, AT.velocity), equation.of_dofs(p, AT.start))
+    dense.copy(equation.of_dofs(p, AT.smooth_force), equation.of_dofs(p, AT.force))
+    dense.copy(doubles(equation.number(p, AT.first_stiffness), n), doubles(equation.number(p, AT.row_stiffness), n))
+    dense.copy(doubles(equation.number(p, AT.first_reference), n), doubles(equation.number(p, AT.row_reference), n))
+    _prepare(p, _timestep(p))
+
+
+@njit
+def _answer(p, q, out):
+    """Fill out with the velocity in which MuJoCo's step ends under a generalised force of the sand."""
+    _reset(p)
+    v, residual = equation.of_dofs(p, AT.velocity), equation.step_vector(p, KEEP.four)
+    dense.factor_of(equation.square(p, AT.mass), equation.square(p, AT.mass_factors), equation.order(p, AT.mass_order))
+    implicit.residual_of(p, v, q, residual)
+    implicit.linear_solution(p, v, residual, AT.derivative, False, out)
+
+
+@njit
 def _finish(p, foreseen, last, delta, after, split):
     """Fill the new state."""
     nb, nv, new = equation.number(p, AT.nbody), equation.number(p, AT.nv), _state(p, AT.new)
@@ -252,16 +273,15 @@ def step(p):
 
 @njit
 def _one_step(p, most_parts):
-    """A step from the state AT.before."""
-    nb, nv, n, h = equation.number(p, AT.nbody), equation.number(p, AT.nv), equation.number(p, AT.nrow), _timestep(p)
+    """A step from the state BEFORE."""
+    nb, nv, h = equation.number(p, AT.nbody), equation.number(p, AT.nv), _timestep(p)
     before, v, flags = _state(p, AT.before), equation.of_dofs(p, AT.velocity), doubles(equation.number(p, AT.flags), 2)
+    _reset(p)
     split_before = before[SPLIT] > 0.0
     drift = before[DRIFT] if split_before else h
     dense.copy(v, equation.of_dofs(p, AT.last))
-    start = equation.of_dofs(p, AT.start)
-    dense.copy(v, start)
     if split_before:
-        delta = part_of(before, 2, nv)
+        start, delta = equation.of_dofs(p, AT.start), part_of(before, 2, nv)
         for k in range(nv):
             start[k] += delta[k]
     if before[KNOWS_FORCE] > 0.0:
@@ -269,9 +289,6 @@ def _one_step(p, most_parts):
     dense.copy(part_of(before, 0, nv), equation.of_dofs(p, AT.foreseen))
     dense.copy(before[HEAD + 4 * nv :], doubles(equation.number(p, AT.derivative), 36 * nb))
     flags[0] = before[KNOWS_DERIVATIVE]
-    dense.copy(equation.of_dofs(p, AT.smooth_force), equation.of_dofs(p, AT.force))
-    dense.copy(doubles(equation.number(p, AT.first_stiffness), n), doubles(equation.number(p, AT.row_stiffness), n))
-    dense.copy(doubles(equation.number(p, AT.first_reference), n), doubles(equation.number(p, AT.row_reference), n))
     _prepare(p, 0.5 * (drift + h))
     native_solver.solve(p)
     solved = flags[1] > 0.0
@@ -290,24 +307,38 @@ def _one_step(p, most_parts):
 
 
 @njit
-def _hold_contacts(p):
-    """Let contacts keep the force that the whole step gave them: MuJoCo will give them one force."""
-    after = equation.point_vector(p, equation.point(p, POINT.best), PART.velocity)
-    v, change = equation.of_dofs(p, AT.velocity), equation.step_vector(p, KEEP.one)
-    for k in range(v.size):
-        change[k] = after[k] - v[k]
-    _prepare(p, _timestep(p))
+def _add_contacts(p, share, out):
+    """Add a share of the contacts' generalised force, in the part of a step that was just solved, to out."""
+    start, end, change = equation.of_dofs(p, AT.start), equation.of_dofs(p, AT.end), equation.step_vector(p, KEEP.one)
     x, force = rows.row_scratch(p, ROW.x), rows.row_scratch(p, ROW.force)
+    if x.size == 0:
+        return
+    for k in range(out.size):
+        change[k] = end[k] - start[k]
     rows.accelerations(p, change, x)
     rows.forces(p, x, force)
     kind = int64s(equation.number(p, AT.row_kind), x.size)
-    stiffness = equation.of_rows(p, AT.row_stiffness)
     for i in range(x.size):
-        if kind[i] >= KIND.contact:
-            stiffness[i] = 0.0
-        else:
+        if kind[i] < KIND.contact:
             force[i] = 0.0
-    dense.add_transposed(equation.rows_by_dofs(p, AT.row_jacobian), force, 1.0, equation.of_dofs(p, AT.force))
+    dense.add_transposed(equation.rows_by_dofs(p, AT.row_jacobian), force, share, out)
+
+
+@njit
+def _leave_to_mujoco(p, touched):
+    """Take the contacts' rows for the force that they had in the parts of a step; whether there are any.
+
+    Whatever MuJoCo's own solution of the contacts differs by is not for the sand to make up for.
+    """
+    found = False
+    kind = int64s(equation.number(p, AT.row_kind), equation.number(p, AT.nrow))
+    stiffness, force = equation.of_rows(p, AT.row_stiffness), equation.of_dofs(p, AT.force)
+    for i in range(kind.size):
+        if kind[i] >= KIND.contact:
+            stiffness[i], found = 0.0, True
+    for k in range(touched.size):
+        force[k] += touched[k]
+    return found
 
 
 @njit
@@ -317,20 +348,19 @@ def _split_step(p, parts):
     before, new, v = _state(p, AT.before), _state(p, AT.new), equation.of_dofs(p, AT.velocity)
     kicked, foreseen, end = equation.of_dofs(p, AT.start), equation.of_dofs(p, AT.foreseen), equation.of_dofs(p, AT.end)
     last, pushed, at = equation.of_dofs(p, AT.last), equation.of_dofs(p, AT.force), equation.point(p, POINT.best)
-    held, mean, moved = (
-        equation.step_vector(p, KEEP.two),
+    mean, moved, smooth = (
         equation.step_vector(p, KEEP.three),
         equation.step_vector(p, KEEP.four),
+        equation.of_dofs(p, AT.smooth_force),
     )
     change, count = equation.step_vector(p, KEEP.five), doubles(equation.number(p, AT.count), 3)
+    touched = equation.step_vector(p, KEEP.two)
     flags, j = doubles(equation.number(p, AT.flags), 2), equation.rows_by_dofs(p, AT.row_jacobian)
     reference, first = equation.of_rows(p, AT.row_reference), equation.of_rows(p, AT.first_reference)
     damping, spring = equation.of_rows(p, AT.row_damping), equation.of_rows(p, AT.row_spring)
     wrench = doubles(equation.number(p, AT.wrench), 6 * nb)
-    _hold_contacts(p)
-    dense.copy(pushed, held)
     for k in range(nv):
-        foreseen[k] = mean[k] = moved[k] = 0.0
+        foreseen[k] = mean[k] = moved[k] = touched[k] = 0.0
     for k in range(6 * nb):
         wrench[k] = 0.0
     flags[0] = 0.0
@@ -348,7 +378,7 @@ def _split_step(p, parts):
             reference[i] = first[i] - damping[i] * dense.dot(j[i], change) - spring[i] * dense.dot(j[i], moved)
         dense.multiply(equation.square(p, AT.drag), change, pushed)
         for k in range(nv):
-            pushed[k] = held[k] - pushed[k]
+            pushed[k] = smooth[k] - pushed[k]
         dense.copy(kicked, last)
         native_solver.solve(p)
         if flags[1] == 0.0:
@@ -356,6 +386,7 @@ def _split_step(p, parts):
                 part *= 0.25
                 continue
             count[2] += 1.0
+        _add_contacts(p, part / h, touched)
         _sink(p, end, part)
         implicit.generalised(p, at, 1, foreseen)
         for k in range(nv):
@@ -368,9 +399,13 @@ def _split_step(p, parts):
                 wrench[6 * b + k] += now[k] * (part / h)
         drift, done = part, done + part
         part = min(2.0 * part, h / parts)
-    _finish(p, foreseen, equation.point_vector(p, at, PART.velocity), kicked, mean, True)
+    true, answer, q = equation.step_vector(p, KEEP.six), equation.of_dofs(p, AT.end), equation.of_dofs(p, AT.out)
+    dense.copy(kicked, true)
+    _reset(p)
+    has_contacts = _leave_to_mujoco(p, touched)
+    dense.copy(mean, answer)
+    _force_of(p, answer, q)
+    if has_contacts:
+        _answer(p, q, answer)
+    _finish(p, foreseen, equation.point_vector(p, at, PART.velocity), true, answer, True)
     new[DRIFT] = drift
-    dense.copy(held, pushed)
-    dense.copy(first, reference)
-    dense.copy(mean, last)
-    _force_of(p, last, equation.of_dofs(p, AT.out))

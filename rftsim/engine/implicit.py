@@ -141,6 +141,8 @@ def _fill_rows(model, data, contact, m, d, p, dragged):
     for i in range(n):
         kind[i], bound[i] = _KINDS[kinds[i]], loss[i]
         damping[i], spring[i] = kbip[4 * i + 1], kbip[4 * i] * kbip[4 * i + 2]
+        if kind[i] >= KIND.contact:  # a pyramid's rows mix gap and slip
+            spring[i] = 0.0
         if kind[i] == KIND.cone:
             inside = inside + 1 if i > 0 and kinds[i - 1] == kinds[i] and owner[i - 1] == owner[i] else 0
             at = pointer(d + data.contact) + contact.size * owner[i]
