@@ -85,7 +85,7 @@ class Entries(NamedTuple):
     """Velocity at the end, (nv,)."""
     flags: int
     """Whether the derivative is known; whether the equation was solved."""
-    count: int
+    counts: int
     """Evaluations, derivatives, unsolved equations; counted up."""
     matrices: int
     """Scratch, (2, nv, nv)."""
@@ -216,7 +216,7 @@ def _place(table, entry, at, count):
 def lay_out(p, at, nbody, nv, nrow, state):
     """Fill the table at p with addresses from `at` on; the address behind the last.
 
-    What lies elsewhere (AT.sand, AT.count, AT.old, AT.new) is for the caller to fill.
+    What lies elsewhere (AT.sand, AT.counts, AT.old, AT.new) is for the caller to fill.
     """
     t = int64s(p, ENTRIES)
     t[AT.nbody], t[AT.nv], t[AT.nrow] = nbody, nv, nrow

@@ -8,7 +8,7 @@ it chatters and is biased; here v+ solves
 tau the other smooth forces, f the constraints' by MuJoCo's own law, Q the sand's with |v| / sqrt(|v|^2 + V_C^2) before
 each triangle's stress. The solver is Newton's method with kept derivatives of the sand (a rank-one update per body and
 iteration); each of its steps solves the constraints exactly for the sand's force linearised, which costs no evaluation.
-Where a step passes rest or the edge of a face, the next trial is at rest, or takes a derivative that does not overshoot.
+Where a step passes rest or the edge of a face, the next trial is at rest, or by a derivative that cannot overshoot.
 
 All twists and wrenches here are about the body's origin, in world axes: velocity or force first. `p` is the address of
 the equation's table.
@@ -91,7 +91,7 @@ def evaluate(p, v, at):
         out = equation.point_wrench(p, at, b, 0).ctypes.data
         ahead(sand, equation.body_surface(p, b), f, r, twist.ctypes.data, h, out)
         twist[0] = 0.0  # used after the call, so that it lives as long as its address is
-    doubles(equation.number(p, AT.count), 3)[0] += 1.0
+    doubles(equation.number(p, AT.counts), 3)[0] += 1.0
 
 
 @njit
@@ -105,7 +105,7 @@ def differentiate(p, v, completed):
         out = equation.derivative(p, AT.completed if completed else AT.derivative, b).ctypes.data
         jacobian(sand, equation.body_surface(p, b), f, r, twist.ctypes.data, 1.0 if completed else 0.0, out)
         twist[0] = 0.0
-    doubles(equation.number(p, AT.count), 3)[1] += 1.0
+    doubles(equation.number(p, AT.counts), 3)[1] += 1.0
 
 
 @njit

@@ -395,7 +395,7 @@ def _jacobians(stress: Any) -> Any:
         A law depends on the direction of motion alone but for the scale at rest and the inertial term, so two
         differences across the motion and those two closed forms give all of it.
 
-        `completed` (0 or 1) asks for a matrix that does not overshoot where the law jumps: tangent across the motion and
+        `completed` (0 or 1) asks for a matrix that cannot overshoot where the law jumps: tangent across the motion and
         secant along it (1 / r instead of v_c^2 / r^3, r^2 = |v|^2 + v_c^2), and secant where a face's edge leads.
 
         The BLOCK triangles' columns lie in `scratch`, (SCRATCH,), from `COLUMNS_AT` on.

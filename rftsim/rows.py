@@ -1,7 +1,7 @@
 """MuJoCo's constraint forces by MuJoCo's own law, as functions of the velocity at the end of a step.
 
-A row's force is -D (J a - aref): always (equality), where it pushes (limit, frictionless and pyramidal contact), up to a
-bound (friction), or within a cone over all rows of a contact (elliptic contact).
+A row's force is -D (J a - aref): always (equality), where it pushes (limit, frictionless and pyramidal contact), up to
+a bound (friction), or within a cone over all rows of a contact (elliptic contact).
 """
 
 import numpy as np

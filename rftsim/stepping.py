@@ -297,7 +297,7 @@ def _one_step(p, most_parts):
         _split_step(p, parts)
         return
     if not solved:
-        doubles(equation.number(p, AT.count), 3)[2] += 1.0
+        doubles(equation.number(p, AT.counts), 3)[2] += 1.0
     at, foreseen, end = equation.point(p, POINT.best), equation.step_vector(p, KEEP.six), equation.of_dofs(p, AT.end)
     implicit.generalised(p, at, 1, foreseen)
     _finish(p, foreseen, equation.point_vector(p, at, PART.velocity), end, end, False)
@@ -353,7 +353,7 @@ def _split_step(p, parts):
         equation.step_vector(p, KEEP.four),
         equation.of_dofs(p, AT.smooth_force),
     )
-    change, count = equation.step_vector(p, KEEP.five), doubles(equation.number(p, AT.count), 3)
+    change, count = equation.step_vector(p, KEEP.five), doubles(equation.number(p, AT.counts), 3)
     touched = equation.step_vector(p, KEEP.two)
     flags, j = doubles(equation.number(p, AT.flags), 2), equation.rows_by_dofs(p, AT.row_jacobian)
     reference, first = equation.of_rows(p, AT.row_reference), equation.of_rows(p, AT.first_reference)

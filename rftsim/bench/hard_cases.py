@@ -13,11 +13,11 @@ import mujoco
 import numpy as np
 from rftsim_models.wheels import WheelParameters, build_wheel
 
-import rftsim
+from rftsim.sand import FreeSurface, Sand
+from rftsim.scene import add_sand
 
-SAND: Final = rftsim.Sand(rho_c=3000.0, mu_int=0.4, mu_surf=0.4, xi_n=0.92e6)
+SAND: Final = Sand(rho_c=3000.0, mu_int=0.4, mu_surf=0.4, xi_n=0.92e6)
 RESTING: Final = 10.0
-"""How long bodies are left alone [s]."""
 
 Force = Literal["explicit", "implicit"]
 Measured = Mapping[str, float]
@@ -43,10 +43,13 @@ class Trial:
         **options: Those of `add_sand`.
     """
 
+    resting = RESTING
+    """How long bodies are left alone where rest is judged [s]."""
+
     def __init__(self, spec: mujoco.MjSpec, h: float, force: Force, **options: Any) -> None:
         spec.option.timestep = h
         sand = options.pop("sand", SAND)
-        rftsim.add_sand(spec, sand, options.pop("law", "rft3d"), force=force, draw=False, **options)
+        add_sand(spec, sand, options.pop("law", "rft3d"), force=force, draw=False, **options)
         self.h = h
         self.model = spec.compile()
         self.data = mujoco.MjData(self.model)
@@ -121,7 +124,7 @@ def _sphere(mass: float) -> str:
 def _left_alone(trial: Trial) -> dict[str, float]:
     """Drift, speed and spin of a free body after ten seconds."""
     before = trial.data.qpos[:3].copy()
-    trial.run(RESTING)
+    trial.run(trial.resting)
     velocity = trial.data.qvel
     return {
         "drift": 1e3 * float(np.linalg.norm(trial.data.qpos[:3] - before)),
@@ -144,7 +147,7 @@ def _drop(says: str, geom: str, below: float, exact: float | None = None) -> Har
 
 def plate_depth(mass: float, area: float, fall: float) -> float:
     """Depth [m] at which a flat plate that falls comes to rest: m g (H + z) = xi_n alpha_z A z^2 / 2."""
-    weight, stiffness = mass * 9.81, SAND.zeta * area
+    weight, stiffness = mass * 9.81, float(SAND.zeta or 0.0) * area
     return float((weight + np.sqrt(weight**2 + 2 * stiffness * weight * fall)) / stiffness)
 
 
@@ -181,7 +184,7 @@ def _stuck(trial: Trial) -> Measured:
     trial.data.ctrl[0] = 3.0
     trial.run(0.5)
     before = trial.data.qpos.copy()
-    trial.run(RESTING)
+    trial.run(trial.resting)
     moved = np.abs(trial.data.qpos - before) * [1.0, 1.0, WHEEL.outer_radius]
     return {"sinkage": -1e3 * before[1], "moved": 1e3 * float(moved.max())}
 
@@ -199,7 +202,7 @@ def _roll(trial: Trial) -> Measured:
     }
 
 
-def _legs(h: float, force: Force) -> Trial:
+def legs(h: float, force: Force) -> Trial:
     """A body of 2 kg on four legs of two links, 10 g each."""
     legs, servos = "", ""
     for i, (x, y) in enumerate(((1, 1), (1, -1), (-1, 1), (-1, -1))):
@@ -222,7 +225,7 @@ def _legs(h: float, force: Force) -> Trial:
 
 def capacity_of_legs(h: float = 1e-3) -> float:
     """Sideways force [N] at which the standing legs break away: a force that grows by 2 N/s, at 0.05 m/s."""
-    trial = _legs(h, "implicit")
+    trial = legs(h, "implicit")
     trial.run(1.0)
     while abs(trial.data.qvel[0]) < 0.05:
         trial.data.xfrc_applied[1, 0] += 2.0 * h
@@ -271,7 +274,12 @@ def _pull(trial: Trial) -> Measured:
     trial.run(0.5, lift)
     held = 1e3 * abs(trial.data.qpos[2] - height)
     force = []
-    trial.run(3.5, lambda data: (lift(data), force.append(data.mocap_pos[0, 2] - data.qpos[2])))
+
+    def pull(data: mujoco.MjData) -> None:
+        lift(data)
+        force.append(data.mocap_pos[0, 2] - data.qpos[2])
+
+    trial.run(3.5, pull)
     return {"held": held, "pull": 500.0 * max(force)}
 
 
@@ -334,7 +342,7 @@ def _entered(trial: Trial) -> Measured:
 
 def _tilted(h: float, force: Force) -> Trial:
     slope = np.array([-0.3, 0.0, 1.0])
-    surface = rftsim.FreeSurface(normal=tuple(slope / np.linalg.norm(slope)))
+    surface = FreeSurface(normal=tuple(slope / np.linalg.norm(slope)))
     return Trial(_spec(_free(_plate(0.3), "0 0 .03")), h, force, surface=surface)
 
 
@@ -346,7 +354,8 @@ def _slope(trial: Trial) -> Measured:
 
 def _welded(h: float, force: Force) -> Trial:
     foot = '<body name="foot" pos="0 0 .03"><freejoint/><geom type="box" size=".03 .03 .01" mass=".01"/></body>'
-    load = '<body name="load" pos="0 0 .1"><freejoint/><inertial pos="0 0 0" mass="1" diaginertia=".001 .001 .001"/></body>'
+    inertia = '<inertial pos="0 0 0" mass="1" diaginertia=".001 .001 .001"/>'
+    load = f'<body name="load" pos="0 0 .1"><freejoint/>{inertia}</body>'
     weld = '<equality><weld body1="foot" body2="load" solref=".02 1"/></equality>'
     return Trial(_spec(foot + load, weld), h, force)
 
@@ -369,7 +378,7 @@ def _limited(h: float, force: Force) -> Trial:
 def _limit(trial: Trial) -> Measured:
     trial.run(0.6)
     before = trial.data.qpos.copy()
-    trial.run(RESTING)
+    trial.run(trial.resting)
     return {
         "height": -1e3 * before[0],
         "angle": -1e3 * before[1],
@@ -380,10 +389,8 @@ def _limit(trial: Trial) -> Measured:
 def _stacked(cone: str) -> Callable[[float, Force], Trial]:
     def build(h: float, force: Force) -> Trial:
         raft = '<body name="raft"><freejoint/><geom type="box" size=".1 .1 .01" mass="1" friction=".5"/></body>'
-        load = (
-            '<body name="load" pos=".02 0 .08"><freejoint/><geom type="box" size=".03 .03 .03" mass=".5" friction=".5"/>'
-            "</body>"
-        )
+        box = '<geom type="box" size=".03 .03 .03" mass=".5" friction=".5"/>'
+        load = f'<body name="load" pos=".02 0 .08"><freejoint/>{box}</body>'
         spec = _spec(raft + load)
         spec.option.cone = getattr(mujoco.mjtCone, f"mjCONE_{cone.upper()}")
         trial = Trial(spec, h, force)
@@ -420,12 +427,12 @@ CASES: Final[Mapping[str, HardCase]] = {
     ),
     "legs, held": HardCase(
         "2 kg on legs of 10 g links, pushed at half of what the sand holds",
-        _legs,
+        legs,
         _held,
         {"height": Judged("mm")} | REST,
     ),
     "legs, broken away": HardCase(
-        "the same, pushed at twice what the sand holds", _legs, _broken, {"travel": Judged("mm")}
+        "the same, pushed at twice what the sand holds", legs, _broken, {"travel": Judged("mm")}
     ),
     "pull": HardCase(
         "a buried sphere pulled out by a slow spring",

@@ -210,7 +210,7 @@ def press(model, data, contact, m, d, number):
     memory = np.empty(equation.lay_out(p, 0, nbody, nv, rows, old.size) // 8)
     equation.lay_out(p, memory.ctypes.data, nbody, nv, rows, old.size)
     entries[AT.old], entries[AT.new] = old.ctypes.data, new.ctypes.data
-    entries[AT.count] = counted.ctypes.data
+    entries[AT.counts] = counted.ctypes.data
     dense.copy(doubles(pointer(d + data.qvel), nv), equation.of_dofs(p, AT.velocity))
     doubles(entries[AT.timestep], 1)[0] = doubles(m + model.opt_timestep, 1)[0]
     t = bodies.tree(model, data, m, d)

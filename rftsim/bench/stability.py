@@ -1,0 +1,228 @@
+"""Stability against the time step: the hard cases at five steps under both forces, against the right answers."""
+
+import hashlib
+import json
+import math
+import statistics
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import mujoco
+import numpy as np
+
+from rftsim.bench import hard_cases
+from rftsim.bench.hard_cases import CASES, Force
+from rftsim.compiled import SOURCE
+from rftsim.readout import work
+
+STEPS: Final = (1e-4, 1e-3, 2e-3, 5e-3, 1e-2)
+"""[s]."""
+CONVERGED: Final = 2e-5
+"""Time step of the converged answers, with the implicit force [s]."""
+FORCES: Final[tuple[Force, ...]] = ("implicit", "explicit")
+STARTS_STEP: Final = 5e-3
+"""Time step of the random starts [s]."""
+
+
+class Played(NamedTuple):
+    """A hard case at one time step under one force."""
+
+    case: str
+    force: Force
+    h: float
+    """[s]."""
+    measured: dict[str, float]
+    failed: bool
+    """Whether MuJoCo reset it, or anything measured is not finite."""
+    cost: float
+    """Elapsed over simulated time."""
+    evaluations: float
+    """Of the force, in the mean over the steps."""
+    jacobians: float
+    """Of its derivative, in the mean over the steps."""
+    unsolved: int
+
+
+class Verdict(NamedTuple):
+    """How a played case compares."""
+
+    error: float
+    """Largest relative error of what has an exact or converged value."""
+    rest: float
+    """Largest of what ought to be zero, over its limit; nan where nothing of that kind is measured."""
+
+
+class Starts(NamedTuple):
+    """Many random starts of a free runner."""
+
+    starts: int
+    failed: int
+    """Simulations that MuJoCo reset, or would have."""
+    gain: float
+    """Largest work of the sand on the runner in one step [J]; negative or zero where it never adds energy."""
+    evaluations: float
+    jacobians: float
+    unsolved: int
+
+
+def play(case: str, h: float, force: Force, *, resting: float | None = None) -> Played:
+    """Play a hard case."""
+    trial = CASES[case].build(h, force)
+    if resting is not None:
+        trial.resting = resting
+    measured = dict(CASES[case].play(trial))
+    spent = work(trial.model, trial.data)
+    steps = max(spent.steps, 1)
+    failed = trial.failed or not all(math.isfinite(value) for value in measured.values())
+    cost = trial.seconds / (trial.steps * h)
+    return Played(
+        case, force, h, measured, failed, cost, spent.evaluations / steps, spent.jacobians / steps, spent.unsolved
+    )
+
+
+def references(case: str) -> dict[str, float]:
+    """The exact or converged value of everything that a case measures and that has one."""
+    judged = CASES[case].judged
+    wanted = [name for name, how in judged.items() if how.limit is None]
+    found = {name: how.exact for name, how in judged.items() if how.exact is not None}
+    if set(wanted) - set(found):
+        converged = play(case, CONVERGED, "implicit", resting=0.0).measured
+        found = {name: converged[name] for name in wanted} | found
+    return found
+
+
+def judge(played: Played, expected: Mapping[str, float]) -> Verdict:
+    """Compare a played case with its exact or converged values."""
+    if played.failed:
+        return Verdict(math.inf, math.inf)
+    errors = [abs(played.measured[name] / value - 1.0) for name, value in expected.items()]
+    limits = [
+        played.measured[name] / how.limit for name, how in CASES[played.case].judged.items() if how.limit is not None
+    ]
+    return Verdict(max(errors, default=math.nan), max(limits, default=math.nan))
+
+
+def random_starts(count: int, report: Callable[[], Any] = lambda: None) -> Starts:
+    """Throw a free runner into the sand in `count` random poses and let it move for a second each."""
+    trial = hard_cases.legs(STARTS_STEP, "implicit")
+    model, data = trial.model, trial.data
+    failed, gain, totals = 0, -math.inf, np.zeros(4)
+    for seed in range(count):
+        mujoco.mj_resetData(model, data)
+        move = hard_cases.start_at_random(trial, seed)
+        for _ in range(round(1.0 / STARTS_STEP)):
+            move(data)
+            before = data.qvel.copy()
+            mujoco.mj_step(model, data)
+            sand = data.qfrc_passive - data.qfrc_spring - data.qfrc_damper - data.qfrc_gravcomp - data.qfrc_fluid
+            gain = max(gain, 0.5 * STARTS_STEP * float(sand @ (before + data.qvel)))
+        failed += trial.failed or not np.isfinite(data.qpos).all()
+        totals += work(model, data)
+        report()
+    steps, evaluations, jacobians, unsolved = totals
+    return Starts(count, failed, gain, evaluations / steps, jacobians / steps, int(unsolved))
+
+
+class Study:
+    """The whole study, remembered in a file, so that it can be stopped and taken up again.
+
+    Args:
+        path: The file; what was measured with this source on this MuJoCo is not measured again.
+    """
+
+    def __init__(self, path: Path) -> None:
+        cases = Path(hard_cases.__file__).read_bytes() + Path(__file__).read_bytes()
+        self.path = path
+        self.key = hashlib.sha256(SOURCE.encode() + cases + mujoco.__version__.encode()).hexdigest()
+        self.known: dict[str, Any] = {}
+        if path.is_file():
+            kept = json.loads(path.read_text())
+            if kept.get("key") == self.key:
+                self.known = kept["known"]
+
+    def _remember(self, name: str, value: Any) -> None:
+        self.known[name] = value
+        temporary = self.path.with_suffix(".part")
+        temporary.write_text(json.dumps({"key": self.key, "known": self.known}))
+        temporary.replace(self.path)
+
+    def played(self, case: str, h: float, force: Force) -> Played:
+        """A case, played now or before."""
+        name = f"{case}/{force}/{h:g}"
+        if name not in self.known:
+            self._remember(name, play(case, h, force))
+        return Played(*self.known[name])
+
+    def expected(self, case: str) -> dict[str, float]:
+        """The exact or converged values of a case."""
+        if f"{case}/expected" not in self.known:
+            self._remember(f"{case}/expected", references(case))
+        return dict(self.known[f"{case}/expected"])
+
+    def starts(self, count: int, report: Callable[[], Any]) -> Starts:
+        """The random starts."""
+        name = f"starts/{count}"
+        if name not in self.known:
+            self._remember(name, random_starts(count, report))
+        return Starts(*self.known[name])
+
+
+class Row(NamedTuple):
+    """A case in the study's table."""
+
+    case: str
+    says: str
+    expected: dict[str, float]
+    played: dict[tuple[Force, float], Played]
+    verdicts: dict[tuple[Force, float], Verdict]
+
+
+def run(study: Study, cases: Iterable[str], steps: Iterable[float], report: Callable[[str], Any]) -> list[Row]:
+    """Play cases at time steps under both forces; `report` is called with the name of each when it ends."""
+    rows = []
+    for case in cases:
+        expected = study.expected(case)
+        report(f"{case}, converged")
+        played, verdicts = {}, {}
+        for force in FORCES:
+            for h in steps:
+                played[force, h] = study.played(case, h, force)
+                verdicts[force, h] = judge(played[force, h], expected)
+                report(f"{case}, {force}, {1e3 * h:g} ms")
+        rows.append(Row(case, CASES[case].says, expected, played, verdicts))
+    return rows
+
+
+class Summary(NamedTuple):
+    """The study in a few numbers; means and medians over the cases."""
+
+    evaluations: dict[float, float]
+    """Mean evaluations per step of the implicit force, by time step [s]."""
+    jacobians: dict[float, float]
+    error: dict[Force, dict[float, float]]
+    """Median error by force and time step [s]."""
+    cost_ratio: float
+    """Median cost of a second simulated at 5 ms with the implicit force, over one at 1 ms with the explicit one; nan
+    where these steps were not taken."""
+    nearer: int
+    """Cases of which the former is nearer to the truth."""
+
+
+def summarise(rows: list[Row]) -> Summary:
+    """Means and medians over the cases."""
+    steps = sorted({h for row in rows for _, h in row.played})
+    error: dict[Force, dict[float, float]] = {
+        force: {h: statistics.median(row.verdicts[force, h].error for row in rows) for h in steps} for force in FORCES
+    }
+    ratio, nearer = math.nan, 0
+    if {1e-3, 5e-3} <= set(steps):
+        ratio = statistics.median(row.played["implicit", 5e-3].cost / row.played["explicit", 1e-3].cost for row in rows)
+        nearer = sum(row.verdicts["implicit", 5e-3].error <= row.verdicts["explicit", 1e-3].error for row in rows)
+    return Summary(
+        {h: statistics.fmean(row.played["implicit", h].evaluations for row in rows) for h in steps},
+        {h: statistics.fmean(row.played["implicit", h].jacobians for row in rows) for h in steps},
+        error,
+        ratio,
+        nearer,
+    )

@@ -1,0 +1,172 @@
+"""`rftsim bench`: what rftsim costs, and what that buys."""
+
+import dataclasses
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Literal
+
+import tyro
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.table import Table
+
+from rftsim.bench.hard_cases import CASES
+from rftsim.bench.stability import FORCES, STEPS, Row, Starts, Study, Summary, run, summarise
+from rftsim.cli.output import check_writable, print_json, replacing
+from rftsim.errors import RftsimError
+from rftsim.plots import plot_stability
+
+
+@dataclasses.dataclass(frozen=True)
+class Bench:
+    """Measure rftsim itself.
+
+    stability: the hard cases (rest, light legs, stiff servos, impacts, edges, constraints) at time steps from 0.1 to
+    10 ms with the implicit and the explicit force, against the exact or converged answer.
+
+    Example: rftsim bench stability --plot out
+    """
+
+    study: tyro.conf.Positional[Literal["stability"]]
+    """What is measured."""
+    cases: tuple[str, ...] = ()
+    """Names of cases; by default all."""
+    starts: int = 1000
+    """Random starts of a free runner."""
+    quick: bool = False
+    """Steps of 1 and 5 ms and 20 random starts only."""
+    plot: Path | None = None
+    """Folder for stability.png."""
+    memory: Path = Path("out/bench")
+    """Folder for what was measured: a study that was stopped goes on from there."""
+    json: bool = False
+    """Print JSON instead of the tables."""
+
+    def __call__(self, warnings: Callable[[], list[str]]) -> None:
+        """Measure, print and draw."""
+        unknown = sorted(set(self.cases) - set(CASES))
+        if unknown:
+            raise RftsimError(f"no case {unknown[0]!r}; cases are {', '.join(CASES)}")
+        if self.starts < 0:
+            raise RftsimError(f"starts must be zero or more, not {self.starts}")
+        picture = None if self.plot is None else self.plot / "stability.png"
+        for folder in (self.memory, self.plot):
+            if folder is not None:
+                folder.mkdir(parents=True, exist_ok=True)
+        for path in (self.memory / "stability.json", picture):
+            if path is not None:
+                check_writable(path)
+        rows, starts = self._measure(Study(self.memory / "stability.json"))
+        summary = summarise(rows)
+        if picture is not None:
+            with replacing(picture) as temporary:
+                plot_stability(rows, temporary)
+        if self.json:
+            print_json(_report(rows, summary, starts))
+            return
+        console = Console()
+        for table in (_errors(rows), _costs(rows)):
+            console.print(table)
+        _print_summary(console, summary, len(rows), starts)
+        if picture is not None:
+            console.print(f"wrote {picture}", highlight=False)
+
+    def _measure(self, study: Study) -> tuple[list[Row], Starts]:
+        names, steps = self.cases or tuple(CASES), (1e-3, 5e-3) if self.quick else STEPS
+        count = min(self.starts, 20) if self.quick else self.starts
+        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
+        console = Console(stderr=True)
+        total = len(names) * (1 + len(FORCES) * len(steps)) + count
+        with Progress(*columns, TimeElapsedColumn(), TimeRemainingColumn(), console=console, disable=self.json) as bar:
+            task = bar.add_task("stability", total=total)
+            rows = run(study, names, steps, lambda name: bar.update(task, advance=1, description=name))
+            bar.update(task, description="random starts")
+            starts = study.starts(count, lambda: bar.advance(task))
+        return rows, starts
+
+
+def _percent(value: float) -> str:
+    if math.isnan(value):
+        return "-"
+    if value > 9.995:
+        return "lost"
+    return f"{100 * value:.2f}" if value < 0.0995 else f"{100 * value:.0f}"
+
+
+def _steps(rows: list[Row]) -> list[float]:
+    return sorted({h for row in rows for _, h in row.played})
+
+
+def _errors(rows: list[Row]) -> Table:
+    table = Table(title="error [%] against the exact or converged answer, by time step [ms]")
+    table.add_column("case")
+    for force in FORCES:
+        for h in _steps(rows):
+            table.add_column(f"{force}\n{1e3 * h:g}", justify="right")
+    for row in rows:
+        table.add_row(row.case, *(_percent(row.verdicts[force, h].error) for force in FORCES for h in _steps(rows)))
+    return table
+
+
+def _costs(rows: list[Row]) -> Table:
+    table = Table(
+        title="implicit force: what ought to rest over its limit; evaluations + derivatives per step; unsolved"
+    )
+    table.add_column("case")
+    for h in _steps(rows):
+        table.add_column(f"rest\n{1e3 * h:g}", justify="right")
+    for h in _steps(rows):
+        table.add_column(f"work\n{1e3 * h:g}", justify="right")
+    table.add_column("unsolved", justify="right")
+    for row in rows:
+        rests = [row.verdicts["implicit", h].rest for h in _steps(rows)]
+        played = [row.played["implicit", h] for h in _steps(rows)]
+        table.add_row(
+            row.case,
+            *("-" if math.isnan(rest) else f"{rest:.2g}" for rest in rests),
+            *(f"{one.evaluations:.2f}+{one.jacobians:.2f}" for one in played),
+            str(sum(one.unsolved for one in played)),
+        )
+    return table
+
+
+def _print_summary(console: Console, summary: Summary, cases: int, starts: Starts) -> None:
+    def listed(values: dict[float, float], scale: float = 1.0) -> str:
+        return ", ".join(f"{scale * value:.3g} at {1e3 * h:g} ms" for h, value in values.items())
+
+    for line in (
+        f"evaluations per step, mean over the cases: {listed(summary.evaluations)}",
+        f"derivatives per step (each about 3.5 evaluations): {listed(summary.jacobians)}",
+        *(f"median error [%], {force}: {listed(error, 100)}" for force, error in summary.error.items()),
+        f"a second at 5 ms implicit costs {summary.cost_ratio:.2f} of one at 1 ms explicit in the median, and is "
+        f"nearer to the truth in {summary.nearer} of {cases} cases",
+        f"{starts.starts} random starts at 5 ms: {starts.failed} lost, largest work of the sand in a step "
+        f"{starts.gain:.2g} J, {starts.evaluations:.2f} evaluations and {starts.jacobians:.2f} derivatives per step, "
+        f"{starts.unsolved} unsolved",
+    ):
+        console.print(line, highlight=False, soft_wrap=True)
+
+
+def _report(rows: list[Row], summary: Summary, starts: Starts) -> dict[str, object]:
+    return {
+        "cases": [
+            {
+                "case": row.case,
+                "says": row.says,
+                "expected": row.expected,
+                "played": [
+                    played._asdict() | row.verdicts[force, h]._asdict() for (force, h), played in row.played.items()
+                ],
+            }
+            for row in rows
+        ],
+        "summary": {
+            "evaluations": summary.evaluations,
+            "jacobians": summary.jacobians,
+            "median_error": summary.error,
+            "cost_ratio_implicit_5ms_explicit_1ms": summary.cost_ratio,
+            "nearer_of": [summary.nearer, len(rows)],
+        },
+        "random_starts": starts._asdict(),
+    }
