@@ -373,46 +373,49 @@ def _try_along(p, direction, t, k):
 
 
 @njit
-def centre(p):
-    """Fill END: the best point, corrected to first order for the force at the step's mean velocity instead of its end.
+def _is_small(p, change, v, share):
+    """Whether a share of a velocity change makes no difference to any body."""
+    for b in range(equation.number(p, AT.nbody)):
+        if share * speed_of(p, b, change) > CENTRED * speed_of(p, b, v) + 10.0 * V_C:
+            return False
+    return True
 
-    What is stiff against the mass is left out, by M A^-1: a body that stops in the step stays stopped.
+
+@njit
+def centre(p):
+    """Fill END: one step of Newton's method from the best point, without an evaluation.
+
+    It is corrected to first order for the force at the step's mean velocity instead of its end. What is stiff against
+    the mass is left out of that, by M A^-1: a body that stops in the step stays stopped.
     """
-    at = equation.point(p, POINT.best)
-    v, start, end = (
-        equation.point_vector(p, at, PART.velocity),
-        equation.of_dofs(p, AT.start),
-        equation.of_dofs(p, AT.end),
-    )
+    at, known = equation.point(p, POINT.best), doubles(equation.number(p, AT.flags), 2)[0] > 0.0
+    v, start = equation.point_vector(p, at, PART.velocity), equation.of_dofs(p, AT.start)
+    end, residual = equation.of_dofs(p, AT.end), equation.point_vector(p, at, PART.residual)
+    mean, difference = equation.vector(p, VECTOR.mean), equation.vector(p, VECTOR.difference)
+    solved = equation.vector(p, VECTOR.filtered)
     dense.copy(v, end)
-    if doubles(equation.number(p, AT.flags), 2)[0] == 0.0:
-        return
-    h = doubles(equation.number(p, AT.step), 2)[0]
-    mean, difference, solved = (
-        equation.vector(p, VECTOR.mean),
-        equation.vector(p, VECTOR.difference),
-        equation.vector(p, VECTOR.filtered),
-    )
-    twist, wrench = np.empty(6), np.empty(6)
     for k in range(v.size):
         mean[k] = v[k] - start[k]
+    is_small = not known or _is_small(p, mean, v, 0.5)
+    scores = equation.point_scores(p, at)
+    if is_small and scores[0] < 1e-4 * scores[1]:
+        return
+    linear_solution(p, v, residual, AT.derivative, known, end)
+    if is_small:
+        return
+    h = doubles(equation.number(p, AT.step), 2)[0]
+    twist, wrench = np.empty(6), np.empty(6)
+    for k in range(v.size):
         difference[k] = 0.0
     for b in range(equation.number(p, AT.nbody)):
         twist_of(p, b, mean, twist)
         dense.multiply(equation.derivative(p, AT.derivative, b), twist, wrench)
         dense.add_transposed(equation.body_jacobian(p, b), wrench, -0.5 * h, difference)
-    _linearise(p, AT.derivative, True)
-    x, force = rows.row_scratch(p, ROW.x), rows.row_scratch(p, ROW.force)
-    if x.size > 0:
-        rows.accelerations(p, mean, x)
-        rows.forces(p, x, force)
-    _factor_with_rows(p, x, force)
     _filter(p, difference, solved)
-    effect = 0.0
-    for b in range(equation.number(p, AT.nbody)):
-        effect = max(effect, speed_of(p, b, solved) / (CENTRED * speed_of(p, b, v) + 10.0 * V_C))
-    if effect < 1.0:
+    if _is_small(p, solved, v, 1.0):
         return
+    dense.multiply(equation.square(p, AT.mass), mean, difference)
+    largest = 0.25 * dense.dot(mean, difference)
     for k in range(v.size):
         mean[k] = 0.5 * (start[k] + v[k])
     spare = equation.point(p, POINT.spare)
@@ -422,21 +425,15 @@ def centre(p):
     for k in range(v.size):
         difference[k] = h * (difference[k] - mean[k])
     _filter(p, difference, solved)
-    share = 0.0
-    for k in range(v.size):
-        mean[k] = v[k] - start[k]
-    dense.multiply(equation.square(p, AT.mass), mean, difference)
-    largest = dense.dot(mean, difference)
     dense.multiply(equation.square(p, AT.mass), solved, difference)
-    if dense.dot(solved, difference) <= 0.25 * largest:  # else the derivative is not to be trusted
-        share = 1.0
-    for k in range(v.size):
-        end[k] += share * solved[k]
+    if dense.dot(solved, difference) <= largest:  # else the derivative is not to be trusted
+        for k in range(v.size):
+            end[k] += solved[k]
 
 
 @njit
 def _filter(p, impulse, out):
-    """Fill out with A^-1 M A^-1 impulse, A the factors in scratch matrix 1."""
+    """Fill out with A^-1 M A^-1 impulse, A the matrix that `linear_solution` left factored."""
     lu, order, between = equation.scratch(p, 1), equation.order(p, AT.order), equation.vector(p, VECTOR.solved)
     dense.substitute(lu, order, impulse, out)
     dense.multiply(equation.square(p, AT.mass), out, between)

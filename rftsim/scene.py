@@ -55,7 +55,7 @@ def add_sand(
     allow_open: bool = False,
     sensors: bool = True,
     draw: bool = True,
-    force: Literal["explicit", "implicit"] = "explicit",
+    force: Literal["implicit", "explicit"] = "implicit",
     name: str = "sand",
 ) -> Bed:
     """Put sand under a model that is not compiled yet.
@@ -78,9 +78,8 @@ def add_sand(
         allow_open: Accept meshes that are not closed.
         sensors: Add the sensors.
         draw: Draw the free surface as a translucent plane.
-        force: `explicit`: the sand's force at the velocity of the moment; `implicit`: at the end of each step, which
-            holds at rest and at long steps. It compiles for minutes the first time that it is asked for on a machine,
-            and the integrator RK4 takes the explicit force all the same.
+        force: `implicit`: the sand's force at the end of each step, which holds at rest and at long steps; `explicit`:
+            at the velocity of the moment, which the integrator RK4 takes in any case.
         name: Name of the bed, where a model has several.
 
     Returns:
@@ -90,7 +89,7 @@ def add_sand(
         RftsimError: The scene cannot have sand: unknown bodies, surfaces that bound nothing, flags that would skip it.
     """
     if force not in ("explicit", "implicit"):
-        raise SceneError(f"force must be 'explicit' or 'implicit', not {force!r}")
+        raise SceneError(f"force must be 'implicit' or 'explicit', not {force!r}")
     if geoms not in ("collision", "all"):
         raise SceneError(f"geoms must be 'collision' or 'all', not {geoms!r}")
     if max_edge is not None and not max_edge > 0.0:

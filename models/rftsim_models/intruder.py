@@ -50,7 +50,7 @@ def build_intruder(
     spec.modelname = INTRUDER
     spec.option.gravity = [0, 0, -gravity]
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    spec.option.timestep = 2e-4
+    spec.option.timestep = 1e-3
     furnish(spec)
     points = np.asarray(vertices, dtype=float)
     spec.add_mesh(name=INTRUDER, uservert=points.ravel(), userface=np.asarray(faces).ravel())

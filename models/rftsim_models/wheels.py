@@ -139,7 +139,7 @@ def build_wheel(parameters: WheelParameters, rpm: float) -> mujoco.MjSpec:
     spec.modelname = "wheel"
     spec.option.gravity = [0, 0, -parameters.gravity]
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    spec.option.timestep = 2e-4
+    spec.option.timestep = 5e-4
     furnish(spec)
     for name, felt in (("felt", True), ("looks", False)):
         vertices, faces = extruded(parameters.outline(felt), parameters.width, rings=parameters.rings)
