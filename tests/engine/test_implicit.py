@@ -1,10 +1,12 @@
-"""The implicit force at long steps: depth, rest, and the energy balance."""
+"""The implicit force at long steps: depth, rest, the energy balance, and MuJoCo's own answer to it."""
 
 import mujoco
 import numpy as np
 import pytest
 
 import rftsim
+from rftsim.bench import hard_cases, stability
+from rftsim.state import HEAD, SPLIT
 
 SAND = rftsim.Sand(xi_n=0.92e6, mu_surf=0.4)
 SHAPES = {
@@ -64,3 +66,111 @@ def test_few_evaluations_at_rest():
     model, data, _ = drop("heavy", 5e-3, seconds=10.0)
     work = rftsim.work(model, data)
     assert work.evaluations + 4 * work.jacobians < 1.2 * work.steps
+
+
+def test_it_is_the_default():
+    xml = '<mujoco><worldbody><body name="b"><freejoint/><geom size=".05"/></body></worldbody></mujoco>'
+    model = rftsim.load(xml, SAND)
+    data = mujoco.MjData(model)
+    mujoco.mj_step(model, data, nstep=3)
+    assert rftsim.work(model, data).evaluations > 0
+    assert data.plugin_state.size > 0
+
+
+def foreseen(trial, steps, before=None):
+    """Largest difference between the velocity that a step was solved for and MuJoCo's, over the largest velocity."""
+    model, data = trial.model, trial.data
+    worst = 0.0
+    for _ in range(steps):
+        if before is not None:
+            before(data)
+        mujoco.mj_step(model, data)
+        start = HEAD + 3 * model.nv
+        expected = data.plugin_state[start : start + model.nv]
+        if expected.any():
+            worst = max(worst, np.abs(expected - data.qvel).max() / np.abs(data.qvel).max())
+    return worst
+
+
+@pytest.mark.parametrize("case", ["contact", "contact, elliptic cone", "weld", "joint limit", "stuck wheel", "pull"])
+@pytest.mark.parametrize("h", [1e-3, 1e-2])
+def test_mujoco_answers_as_foreseen(case, h):
+    """The equation holds MuJoCo's actuators, constraints and integrator: its step ends where the solver said."""
+    trial = hard_cases.CASES[case].build(h, "implicit")
+    # MuJoCo's own solver of contacts stops at 1e-8 relative
+    trial.model.opt.tolerance, trial.model.opt.iterations = 1e-14, 200
+    assert foreseen(trial, round(0.3 / h)) < 1e-5
+
+
+@pytest.mark.parametrize("integrator", ["Euler", "implicit", "implicitfast"])
+def test_every_integrator_answers_as_foreseen(integrator):
+    trial = hard_cases.legs(5e-3, "implicit")
+    trial.model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{integrator.upper()}")
+    trial.model.opt.tolerance, trial.model.opt.iterations = 1e-14, 200
+    assert foreseen(trial, 60) < 1e-5
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_random_starts_gain_no_energy(seed):
+    """MuJoCo's step does on the sand what was foreseen: no work by it, split steps and contacts included."""
+    trial = hard_cases.legs(5e-3, "implicit")
+    move = hard_cases.start_at_random(trial, seed)
+    model, data = trial.model, trial.data
+    split = 0
+    for _ in range(100):
+        move(data)
+        before = data.qvel.copy()
+        mujoco.mj_step(model, data)
+        sand = data.qfrc_passive - data.qfrc_spring - data.qfrc_damper - data.qfrc_gravcomp - data.qfrc_fluid
+        assert 0.5 * 5e-3 * sand @ (before + data.qvel) < 1e-9
+        split += data.plugin_state[SPLIT] > 0.0
+    assert split > 5
+    assert not trial.failed
+
+
+def test_forward_leaves_no_trace():
+    """mj_forward between steps changes nothing that a step would find."""
+    ends = []
+    for extra in (0, 3):
+        trial = hard_cases.CASES["re-entry"].build(5e-3, "implicit")
+        for _ in range(200):
+            for _ in range(extra):
+                mujoco.mj_forward(trial.model, trial.data)
+            mujoco.mj_step(trial.model, trial.data)
+        ends.append(np.concatenate([trial.data.qpos, trial.data.qvel, trial.data.plugin_state]))
+    assert np.array_equal(*ends)
+
+
+def test_study_remembers(tmp_path):
+    """What was measured is not measured again; another source forgets it."""
+    study = stability.Study(tmp_path / "study.json")
+    first = study.played("heavy sphere", 1e-2, "implicit")
+    again = stability.Study(tmp_path / "study.json")
+    assert again.played("heavy sphere", 1e-2, "implicit") == first
+    again.key = "another"
+    again._remember("x", 1)
+    assert stability.Study(tmp_path / "study.json").known == {}
+
+
+EXACT = {"plate": 0.05}
+CLOSE = {"heavy sphere": 0.02, "light sphere": 0.02, "rolling wheel": 0.01, "legs, broken away": 0.03}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", hard_cases.CASES)
+@pytest.mark.parametrize("h", [1e-3, 5e-3])
+def test_hard_case(case, h):
+    """Near the exact or converged answer, at rest where the body rests, and at few evaluations a step."""
+    expected = stability.references(case)
+    played = stability.play(case, h, "implicit")
+    verdict = stability.judge(played, expected)
+    assert verdict.error < (EXACT | CLOSE).get(case, 0.07)
+    assert not verdict.rest > 1.0
+    assert played.evaluations < 6.0
+
+
+@pytest.mark.slow
+def test_a_thousand_random_starts():
+    starts = stability.random_starts(1000)
+    assert starts.failed == 0
+    assert starts.gain < 1e-9
