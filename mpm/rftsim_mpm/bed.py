@@ -1,0 +1,146 @@
+"""Particles, and the level beds that they begin as."""
+
+import dataclasses
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rftsim_mpm.errors import MpmError
+from rftsim_mpm.material import Material
+
+Array = NDArray[np.float64]
+
+
+@dataclasses.dataclass
+class Particles:
+    """The sand's state; each row a particle. In the plane, stresses are xx, yy, zz, xz, else xx, yy, zz, yz, xz, xy."""
+
+    x: Array
+    """Places, (n, dim) [m]."""
+    v: Array
+    """Velocities, (n, dim) [m/s]."""
+    mass: Array
+    """(n,) [kg, in the plane kg/m]."""
+    volume: Array
+    """(n,) [m^3, in the plane m^2]."""
+    stress: Array
+    """Cauchy stress, tension positive, (n, 4 or 6) [Pa]."""
+    theta: Array
+    """Logarithm of the packing fraction, (n,) [-]."""
+    theta_d: Array
+    """Logarithm of the packing fraction of the dense state, (n,) [-]."""
+    strain: Array
+    """Equivalent plastic shear strain, (n,) [-]."""
+    anchor: Array
+    """Where the particle sticks to a body, in its frame, (n, dim) [m]."""
+    held: NDArray[np.int64]
+    """Number of that body, from 1, or 0, (n,)."""
+    number: NDArray[np.int64]
+    """What the particle was before any sorting, (n,)."""
+
+    def __len__(self) -> int:
+        return len(self.x)
+
+    @property
+    def dim(self) -> int:
+        """Dimensions of space."""
+        return self.x.shape[1]
+
+    @property
+    def pressure(self) -> Array:
+        """(n,) [Pa]."""
+        found: Array = -self.stress[:, :3].sum(axis=1) / 3.0
+        return found
+
+    @property
+    def shear(self) -> Array:
+        """Equivalent shear stress tau, (n,) [Pa]."""
+        normal = self.stress[:, :3] + self.pressure[:, None]
+        found: Array = np.sqrt(0.5 * (normal**2).sum(axis=1) + (self.stress[:, 3:] ** 2).sum(axis=1))
+        return found
+
+    @property
+    def packing(self) -> Array:
+        """Packing fraction phi, (n,) [-]."""
+        return np.exp(self.theta)
+
+    @property
+    def momentum(self) -> Array:
+        """(dim,) [kg m/s]."""
+        found: Array = self.mass @ self.v
+        return found
+
+    def select(self, which: NDArray[np.int64] | NDArray[np.bool_]) -> None:
+        """Keep, in this order, the particles of an index or a mask."""
+        for field in dataclasses.fields(self):
+            setattr(self, field.name, np.ascontiguousarray(getattr(self, field.name)[which]))
+
+
+def earth_pressure(mu: float) -> float:
+    """Ratio K_0 of horizontal to vertical stress in a level bed: Jaky's 1 - sin(phi), or the least that can stand.
+
+    nu / (1 - nu) would violate the yield condition: with both horizontal stresses K times the vertical one, sand stands
+    for K >= (sqrt 3 - mu) / (sqrt 3 + 2 mu), and in plane strain sin(phi) = mu.
+    """
+    if mu == math.inf:
+        return 1.0
+    return max(1.0 - mu, (math.sqrt(3.0) - mu) / (math.sqrt(3.0) + 2.0 * mu) * (1.0 + 1e-9))
+
+
+def level_bed(
+    material: Material, size: tuple[float, ...], dx: float, *, gravity: float = 9.81, phi: float | None = None, ppc: int = 2
+) -> Particles:
+    """Sand at rest in equilibrium, from the origin to `size`.
+
+    Args:
+        material: The sand.
+        size: Extent along each axis [m], the last one up; whole numbers of cells.
+        dx: Size of a cell [m].
+        gravity: [m/s^2].
+        phi: Packing fraction of a stress-free particle; the critical one if not given.
+        ppc: Particles per cell along each axis.
+    """
+    phi = material.phi_c if phi is None else phi
+    if not material.phi_min <= phi < 1.0:
+        raise MpmError(f"the bed's packing fraction must be in [{material.phi_min:g}, 1), not {phi:g}")
+    cells = [round(s / dx) for s in size]
+    if any(c < 1 or abs(c * dx - s) > 1e-6 * s for c, s in zip(cells, size, strict=True)):
+        raise MpmError(f"a bed of {' x '.join(f'{s:g}' for s in size)} m is not made of whole cells of {dx:g} m")
+    dim = len(size)
+    axes = [(np.arange(ppc * c) + 0.5) * (dx / ppc) for c in cells]
+    x = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, dim)
+    n = len(x)
+    k0 = earth_pressure(material.mu + (phi - material.phi_c) * material.chi)
+    theta_d = np.full(n, math.log(phi))
+    above = phi * material.rho_g * gravity * (size[-1] - x[:, -1])
+    for _ in range(3):  # the weight of what is above, compressed by it: the change is of the order of p / K
+        theta = theta_d + above * (1.0 + 2.0 * k0) / 3.0 / material.bulk
+        above = _weight_above(x[:, -1], np.exp(theta) * material.rho_g * gravity, dx / ppc)
+    stress = np.zeros((n, 4 if dim == 2 else 6))
+    stress[:, 2] = -above
+    stress[:, :2] = -k0 * above[:, None]
+    volume = np.full(n, (dx / ppc) ** dim)
+    return Particles(
+        x=x,
+        v=np.zeros((n, dim)),
+        mass=volume * material.rho_g * np.exp(theta),
+        volume=volume,
+        stress=stress,
+        theta=theta,
+        theta_d=theta_d,
+        strain=np.zeros(n),
+        anchor=np.zeros((n, dim)),
+        held=np.zeros(n, np.int64),
+        number=np.arange(n),
+    )
+
+
+def _weight_above(z: Array, weight: Array, spacing: float) -> Array:
+    """Vertical stress at each particle of a bed of even layers [Pa]."""
+    layer = np.rint(z / spacing - 0.5).astype(np.int64)
+    per_layer = np.zeros(layer.max() + 1)
+    per_layer[layer] = weight * spacing
+    above = np.cumsum(per_layer[::-1])[::-1] - 0.5 * per_layer
+    found: Array = above[layer]
+    return found
