@@ -45,7 +45,7 @@ class Particles:
     @property
     def dim(self) -> int:
         """Dimensions of space."""
-        return self.x.shape[1]
+        return int(self.x.shape[1])
 
     @property
     def pressure(self) -> Array:
@@ -89,7 +89,13 @@ def earth_pressure(mu: float) -> float:
 
 
 def level_bed(
-    material: Material, size: tuple[float, ...], dx: float, *, gravity: float = 9.81, phi: float | None = None, ppc: int = 2
+    material: Material,
+    size: tuple[float, ...],
+    dx: float,
+    *,
+    gravity: float = 9.81,
+    phi: float | None = None,
+    ppc: int = 2,
 ) -> Particles:
     """Sand at rest in equilibrium, from the origin to `size`.
 

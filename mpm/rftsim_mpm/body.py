@@ -100,5 +100,7 @@ def turned(rotation: Array, angle: Array) -> Array:
         return plane_rotation(float(angle[0])) @ rotation
     size = float(np.linalg.norm(angle))
     k = np.array([[0.0, -angle[2], angle[1]], [angle[2], 0.0, -angle[0]], [-angle[1], angle[0], 0.0]])
-    found: Array = (np.eye(3) + np.sinc(size / np.pi) * k + 0.5 * np.sinc(size / (2.0 * np.pi)) ** 2 * (k @ k)) @ rotation
+    found: Array = (
+        np.eye(3) + np.sinc(size / np.pi) * k + 0.5 * np.sinc(size / (2.0 * np.pi)) ** 2 * (k @ k)
+    ) @ rotation
     return found

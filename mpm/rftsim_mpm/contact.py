@@ -1,8 +1,8 @@
 """Rigid bodies pressing on particles: a stiff layer on the exact surface, with dry friction that remembers.
 
-Particles act a good part of a cell beyond their centres, whatever the scheme, so that bodies would be felt too early, too
-wide and too deep. The layer therefore lies inside the true surface by `inset`. The force is a smooth function of where the
-particles are, with no grid in it, and what it takes from the body it gives to the sand.
+Particles act a good part of a cell beyond their centres, whatever the scheme, so that bodies would be felt too early,
+too wide and too deep. The layer therefore lies inside the true surface by `inset`. The force is a continuous function
+of where the particles are, with no grid in it, and what it takes from the body it gives to the sand.
 """
 
 from typing import Any, NamedTuple
@@ -92,7 +92,7 @@ def distances(shape, points):
 
 def make_contact(dim: int) -> Any:
     """The contact loop of two or three dimensions."""
-    DIM, source = dim, SOURCE  # noqa: N806, F841
+    DIM, source = dim, SOURCE  # noqa: N806
     last = dim - 1
 
     @njit(**OPTIONS)

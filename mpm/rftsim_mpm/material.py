@@ -1,8 +1,8 @@
 """Sand as a frictional continuum: the non-dilatant (NDPM) and the dilatant (DPM) plasticity model.
 
 Both are Drucker-Prager without cohesion: elastic while tau <= mu p, flowing along tau = mu p, and free of stress
-wherever the sand has opened, rho < rho_c. In plane strain without dilatancy this is Mohr-Coulomb with sin(phi) = mu, not
-tan(phi) = mu: where the sand flows, the stress across the plane is the mean of the two in it.
+wherever the sand has opened, rho < rho_c. In plane strain without dilatancy this is Mohr-Coulomb with sin(phi) = mu,
+not tan(phi) = mu: where the sand flows, the stress across the plane is the mean of the two in it.
 """
 
 import dataclasses
@@ -157,7 +157,10 @@ def respond_plane(stress, theta, theta_d, lxx, lxz, lzx, lzz, constants):
         stress: xx, yy, zz, xz at the start [Pa].
         theta: At the end of the step, see `flow`.
         theta_d: At its start.
-        lxx: ... lzz: Velocity gradient times dt [-].
+        lxx: Velocity gradient times dt [-], here and in the three that follow.
+        lxz: d v_x / d z.
+        lzx: d v_z / d x.
+        lzz: d v_z / d z.
         constants: `Material.constants`.
 
     Returns:

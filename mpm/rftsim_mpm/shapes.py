@@ -2,7 +2,6 @@
 
 import dataclasses
 import math
-from pathlib import Path
 
 import numpy as np
 import trimesh
@@ -29,7 +28,7 @@ class Shape:
     @property
     def dim(self) -> int:
         """Dimensions of space."""
-        return self.vertices.shape[1]
+        return int(self.vertices.shape[1])
 
     @property
     def radius(self) -> float:
@@ -114,21 +113,6 @@ def mesh(vertices: Array, faces: NDArray[np.int64], name: str = "mesh") -> Shape
     if body.volume < 0.0:
         body.invert()
     return Shape(name, np.array(body.vertices), np.array(body.faces, dtype=np.int64), bool(body.is_convex))
-
-
-def load_shape(path: Path, *, scale: float = 1.0) -> Shape:
-    """A mesh from a file (STL, OBJ, PLY, ...), or the silhouette of a PNG, as wide as `scale` [m]."""
-    if not path.is_file():
-        raise MpmError(f"no file {path}")
-    if path.suffix.lower() == ".png":
-        from rftsim_mpm.silhouette import silhouette  # needs the picture reader of an extra
-
-        return silhouette(path, width=scale)
-    try:
-        body = trimesh.load_mesh(path)
-    except (ValueError, NotImplementedError, KeyError, IndexError) as error:
-        raise MpmError(f"cannot read a mesh from {path}: {error}") from error
-    return mesh(np.array(body.vertices) * scale, np.array(body.faces), path.name)
 
 
 def box(*size: float) -> Shape:
@@ -281,14 +265,26 @@ def _to_edge(w, u):
 
 @njit(error_model="numpy", cache=True)
 def _mesh_distances(points, triangles):
-    """Signed distances of points, (n, 3), from a closed mesh, (m, 3, 3); the sign by the solid angle about the point."""
+    """Signed distances of points, (n, 3), from a closed mesh, (m, 3, 3); the sign by the solid angle about each."""
     found = np.empty(points.shape[0])
     for p in range(points.shape[0]):
         best, angle = np.inf, 0.0
         for t in range(triangles.shape[0]):
-            a = (triangles[t, 0, 0] - points[p, 0], triangles[t, 0, 1] - points[p, 1], triangles[t, 0, 2] - points[p, 2])
-            b = (triangles[t, 1, 0] - points[p, 0], triangles[t, 1, 1] - points[p, 1], triangles[t, 1, 2] - points[p, 2])
-            c = (triangles[t, 2, 0] - points[p, 0], triangles[t, 2, 1] - points[p, 1], triangles[t, 2, 2] - points[p, 2])
+            a = (
+                triangles[t, 0, 0] - points[p, 0],
+                triangles[t, 0, 1] - points[p, 1],
+                triangles[t, 0, 2] - points[p, 2],
+            )
+            b = (
+                triangles[t, 1, 0] - points[p, 0],
+                triangles[t, 1, 1] - points[p, 1],
+                triangles[t, 1, 2] - points[p, 2],
+            )
+            c = (
+                triangles[t, 2, 0] - points[p, 0],
+                triangles[t, 2, 1] - points[p, 1],
+                triangles[t, 2, 2] - points[p, 2],
+            )
             ab, bc, ca = _minus(b, a), _minus(c, b), _minus(a, c)
             n = ab[1] * -ca[2] + ab[2] * ca[1], ab[2] * -ca[0] + ab[0] * ca[2], ab[0] * -ca[1] + ab[1] * ca[0]
             n2 = _dot(n, n)
@@ -297,7 +293,11 @@ def _mesh_distances(points, triangles):
             over = True
             for edge, start in ((ab, a), (bc, b), (ca, c)):
                 w = _minus(foot, start)
-                turn = (edge[1] * w[2] - edge[2] * w[1], edge[2] * w[0] - edge[0] * w[2], edge[0] * w[1] - edge[1] * w[0])
+                turn = (
+                    edge[1] * w[2] - edge[2] * w[1],
+                    edge[2] * w[0] - edge[0] * w[2],
+                    edge[0] * w[1] - edge[1] * w[0],
+                )
                 over = over and _dot(turn, n) >= 0.0
             if over:
                 best = min(best, height * height / n2)

@@ -21,8 +21,8 @@ Array = NDArray[np.float64]
 INSET = 0.5
 """How far inside a body's true surface particles are stopped, in cells.
 
-Measured: with half a cell the force on a plate pushed down, tilted by 30 degrees or dragged is the same at 10 and 20 cells
-per plate, within 5 %; at the surface itself it is first order and high.
+Measured: with half a cell the force on a plate pushed down, tilted by 30 degrees or dragged is the same at 10 and 20
+cells per plate, within 5 %; at the surface itself it is first order and high.
 """
 CONTACT_STIFFNESS = 1.0
 """Of the contact layer, in Young's moduli per cell: particles sink in by p / E cells."""
@@ -125,8 +125,8 @@ class Simulation:
             deepest = -float(distance.table.min()) if distance.table.size else float(distance.planes[:, -1].min())
             if deepest <= 1.05 * self.inset:
                 raise MpmError(
-                    f"{body.shape.name} is too thin for cells of {self.dx:g} m: contact lies {self.inset:g} m inside its "
-                    f"surface, and it is {2.0 * deepest:g} m thick; use smaller cells"
+                    f"{body.shape.name} is too thin for cells of {self.dx:g} m: contact lies {self.inset:g} m inside "
+                    f"its surface, and it is {2.0 * deepest:g} m thick; use smaller cells"
                 )
 
     def clear_bodies(self) -> None:
@@ -176,8 +176,8 @@ class Simulation:
         for i, (body, distance) in enumerate(zip(self.bodies, self._distances, strict=True)):
             layer = (self.inset, CONTACT_STIFFNESS * self.material.young / self.dx, body.friction)
             count = self._kernels.touch(
-                p.x, p.volume, self._low, 1.0 / self.dx, self._shape, distance, body.position, body.rotation, i + 1, layer,
-                p.anchor, p.held, self._hit, self._push, self._grid,
+                p.x, p.volume, self._low, 1.0 / self.dx, self._shape, distance, body.position, body.rotation, i + 1,
+                layer, p.anchor, p.held, self._hit, self._push, self._grid,
             )  # fmt: skip
             force = -self._push[:count]
             arm = p.x[self._hit[:count]] - body.position
@@ -187,4 +187,3 @@ class Simulation:
             else:
                 self.moment[i] = np.cross(arm, force).sum(axis=0)
             self.contacts.append(Contacts(arm @ body.rotation, force @ body.rotation))
-

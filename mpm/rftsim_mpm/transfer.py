@@ -45,13 +45,13 @@ def pick(w, a):
 
 @njit(inline="always")
 def small_exp(e):
-    """exp(e) to round-off for |e| < 0.01, more than one step strains: the library's costs as much as a stress update."""
+    """exp(e) to round-off for |e| < 0.01, more than a step strains: the library's costs as much as a stress update."""
     return 1.0 + e * (1.0 + e * (0.5 + e * (1 / 6 + e * (1 / 24 + e * (1 / 120 + e / 720)))))
 
 
 def make_transfer(dim: int) -> Transfer:
     """The loops of two (plane strain) or three dimensions."""
-    DIM, source = dim, SOURCE  # noqa: N806, F841
+    DIM, source = dim, SOURCE  # noqa: N806
     last = dim - 1
 
     @njit(**OPTIONS)
@@ -207,9 +207,9 @@ def make_transfer(dim: int) -> Transfer:
                 opening = rate * (lxx + lyy + lzz)
                 theta[p] -= opening
                 volume[p] *= small_exp(opening)
-                old = stress[p, 0], stress[p, 1], stress[p, 2], stress[p, 3], stress[p, 4], stress[p, 5]
-                new, slip, theta_d[p] = respond_solid(
-                    old,
+                six = stress[p, 0], stress[p, 1], stress[p, 2], stress[p, 3], stress[p, 4], stress[p, 5]
+                six, slip, theta_d[p] = respond_solid(
+                    six,
                     theta[p],
                     theta_d[p],
                     rate * lxx,
@@ -223,9 +223,10 @@ def make_transfer(dim: int) -> Transfer:
                     rate * lzz,
                     constants,
                 )
-                stress[p, 4], stress[p, 5] = new[4], new[5]
+                stress[p, 4], stress[p, 5] = six[4], six[5]
+                new = six[0], six[1], six[2], six[3]
             strain[p] += slip
-            stress[p, 0], stress[p, 1], stress[p, 2], stress[p, 3] = new[0], new[1], new[2], new[3]
+            stress[p, 0], stress[p, 1], stress[p, 2], stress[p, 3] = new
 
     @njit(**OPTIONS)
     def order(x, low, inv_dx, shape):
@@ -249,7 +250,7 @@ def make_transfer(dim: int) -> Transfer:
 
     @njit(**OPTIONS)
     def project(x, mass, low, inv_dx, shape, grid, u):
-        """Take from the particles' velocities, (n, dim), what they have on the grid: u -= P u, as mass-weighted means."""
+        """Take from velocities, (n, dim), what they have on the grid: u -= P u, by mass-weighted means."""
         source  # noqa: B018
         grid[:] = 0.0
         ny, nz = shape[1], shape[last]

@@ -1,7 +1,8 @@
 """The grid's own step, and the walls of the box.
 
-A wall is a plane of mirror symmetry: on the grid, the sand has a mirror image behind it. A frictionless wall is therefore
-exactly the middle of a bed twice as wide. Friction acts on the nodes in the plane, at most mu times the normal impulse.
+A wall is a plane of mirror symmetry: on the grid, the sand has a mirror image behind it. A frictionless wall is
+therefore exactly the middle of a bed twice as wide. Friction acts on the nodes in the plane, at most mu times the
+normal impulse.
 """
 
 from typing import Any
@@ -70,7 +71,7 @@ def _rub(grid, shape, dt, axis, side, mu, flow, impulse):
 
 def make_grid_step(dim: int) -> Any:
     """The grid step of two or three dimensions."""
-    DIM, source = dim, SOURCE  # noqa: N806, F841
+    DIM, source = dim, SOURCE  # noqa: N806
 
     @njit(**OPTIONS)
     def step(grid, shape, gravity, dt, friction, flow, impulse):

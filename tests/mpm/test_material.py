@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 from numba import njit
-
 from rftsim_mpm.bed import earth_pressure
 from rftsim_mpm.errors import MpmError
 from rftsim_mpm.material import Material, bearing_factor, respond_plane, respond_solid, return_map

@@ -1,0 +1,165 @@
+"""`rftsim-mpm campaign`: grids of plates."""
+
+import dataclasses
+import os
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import tyro
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+from rftsim_mpm.campaign import Status, alone, begin, manifest, read_plates, results, run, run_on_ray, status
+from rftsim_mpm.cli.report import print_json
+from rftsim_mpm.errors import MpmError
+from rftsim_mpm.output import check_writable, replacing
+
+Folder = tyro.conf.Positional[Path]
+
+
+@dataclasses.dataclass(frozen=True)
+class Work:
+    """How the plates that are not there yet are computed."""
+
+    processes: int = os.cpu_count() or 1
+    """Plates at a time, one thread each."""
+    ray: str | None = None
+    """Use Ray instead: "local", or the address of a cluster."""
+    json: bool = False
+    """Print JSON."""
+
+    def __post_init__(self) -> None:
+        if self.processes < 1:
+            raise MpmError(f"processes must be at least 1, not {self.processes}")
+
+    def __call__(self, folder: Path) -> None:
+        """Compute what is missing, and say how it ended."""
+        with alone(folder):
+            found = status(folder)
+            left = len(found.missing) + len(found.damaged)
+            columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()
+            console = Console(stderr=True)
+            with Progress(
+                *columns, TextColumn("left"), TimeRemainingColumn(), console=console, disable=self.json
+            ) as bar:
+                task = bar.add_task("plates", total=left)
+                if self.ray is None:
+                    failed = run(folder, self.processes, lambda name: bar.advance(task))
+                else:
+                    failed = run_on_ray(
+                        folder, None if self.ray == "local" else self.ray, lambda name: bar.advance(task)
+                    )
+        _say(folder, status(folder), self.json, {"computed": left - len(failed), "failed": failed})
+        if failed:
+            sys.exit(1)
+
+
+@dataclasses.dataclass(frozen=True)
+class CampaignRun:
+    """Compute the plates of a TOML file; what is there already is kept.
+
+    Example: rftsim-mpm campaign run plates.toml out/plates
+    """
+
+    file: Folder
+    """TOML: [[plates]] whose lists are the axes of a grid, and [defaults] for all."""
+    folder: Folder
+    """Where manifest.json and results/ go."""
+    work: tyro.conf.OmitArgPrefixes[Work] = dataclasses.field(default_factory=Work)
+    quick: bool = False
+    """Six cells per plate and less sand."""
+
+    def __call__(self) -> None:
+        """Run."""
+        plates = read_plates(self.file)
+        if self.quick:
+            plates = [dataclasses.replace(plate, cells=6.0, bed=0.5 * plate.bed) for plate in plates]
+        begin(self.folder, plates)
+        self.work(self.folder)
+
+
+@dataclasses.dataclass(frozen=True)
+class CampaignResume:
+    """Compute what a campaign lacks: unfinished plates, and results that are damaged."""
+
+    folder: Folder
+    work: tyro.conf.OmitArgPrefixes[Work] = dataclasses.field(default_factory=Work)
+
+    def __call__(self) -> None:
+        """Run the rest."""
+        manifest(self.folder)
+        self.work(self.folder)
+
+
+@dataclasses.dataclass(frozen=True)
+class CampaignStatus:
+    """How far a campaign is; with --plot, the forces that it has."""
+
+    folder: Folder
+    plot: Path | None = None
+    """Draw force per area and depth against the direction of motion, .png, .pdf or .svg."""
+    json: bool = False
+    """Print JSON."""
+
+    def __call__(self) -> None:
+        """Say."""
+        if self.plot:
+            check_writable(self.plot, ".png", ".pdf", ".svg")
+        found = status(self.folder)
+        if self.plot:
+            from rftsim_mpm.plots import plot_campaign  # matplotlib is an extra
+
+            if not found.finished:
+                raise MpmError(f"the campaign in {self.folder} has no result to draw yet")
+            with replacing(self.plot) as temporary:
+                plot_campaign(results(self.folder), temporary)
+        _say(self.folder, found, self.json, {})
+
+
+@dataclasses.dataclass(frozen=True)
+class CampaignVerify:
+    """Check every result against its checksum and its plate; exits with 1 where one is damaged."""
+
+    folder: Folder
+    json: bool = False
+    """Print JSON."""
+
+    def __call__(self) -> None:
+        """Check and say."""
+        found = status(self.folder)
+        _say(self.folder, found, self.json, {})
+        if found.damaged:
+            sys.exit(1)
+
+
+Campaign = (
+    Annotated[CampaignRun, tyro.conf.subcommand("run")]
+    | Annotated[CampaignResume, tyro.conf.subcommand("resume")]
+    | Annotated[CampaignStatus, tyro.conf.subcommand("status")]
+    | Annotated[CampaignVerify, tyro.conf.subcommand("verify")]
+)
+
+
+@dataclasses.dataclass(frozen=True)
+class CampaignCommand:
+    """A grid of plates as independent processes; stop it in any way, and resume."""
+
+    command: Campaign
+
+    def __call__(self) -> None:
+        """Run the subcommand."""
+        self.command()
+
+
+def _say(folder: Path, found: Status, json: bool, more: dict[str, Any]) -> None:
+    if json:
+        print_json({**found._asdict(), **more})
+        return
+    console = Console(highlight=False, soft_wrap=True)
+    counts = ", ".join(f"{len(keys)} {name}" for name, keys in found._asdict().items())
+    console.print(f"{folder}: {counts}" + (f"; {more['computed']} computed now" if "computed" in more else ""))
+    for name in found.damaged:
+        console.print(f"[red]damaged:[/red] {folder / 'results' / name}.json; `campaign resume` computes it again")
+    for line in more.get("failed", []):
+        Console(stderr=True, highlight=False, soft_wrap=True).print(f"[red]failed:[/red] {line}")

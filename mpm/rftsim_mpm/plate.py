@@ -1,0 +1,297 @@
+"""A flat plate moved through a level bed: the experiment that force laws are fitted to.
+
+Angles as in [Agarwal] chapter 5: the plate's lower face has normal m = (sin b cos p, sin b sin p, -cos b) and moves
+along (cos g, 0, -sin g), for b = beta, g = gamma and p = psi.
+"""
+
+import dataclasses
+import math
+import time
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rftsim_mpm.bed import level_bed
+from rftsim_mpm.body import Body, plane_rotation, turned
+from rftsim_mpm.errors import MpmError
+from rftsim_mpm.material import Material, stiffness
+from rftsim_mpm.reading import History, Log, limit, read
+from rftsim_mpm.shapes import box
+from rftsim_mpm.simulation import Simulation
+
+Array = NDArray[np.float64]
+Watch = Callable[[Simulation, float], None]
+
+
+@dataclasses.dataclass(frozen=True)
+class Plate:
+    """One plate, its motion and its sand; SI and degrees."""
+
+    dim: int = 2
+    """2 for plane strain (forces per metre of width), 3 for a square plate."""
+    beta: float = 0.0
+    """Tilt [deg]."""
+    gamma: float = 90.0
+    """Direction of motion: 0 horizontal, 90 straight down, negative upward [deg]."""
+    psi: float = 0.0
+    """Azimuth of the plate's normal from the direction of motion, in 3D [deg]."""
+    mu_int: float = 0.4
+    """Internal friction of the sand [-]."""
+    mu_surf: float = 0.35
+    """Friction between sand and plate [-]."""
+    rho: float = 1512.0
+    """Critical density of the sand [kg/m^3]."""
+    length: float = 0.05
+    """Length (and in 3D width) of the plate [m]."""
+    thickness: float | None = None
+    """[m]; 0.3 of the length in the plane, 0.2 in space."""
+    depth: float | None = None
+    """Depth of the leading face's centre at which the force is read [m]; 0.4 of the length."""
+    speed: float = 0.1
+    """[m/s]."""
+    cells: float = 10.0
+    """Cells per plate length."""
+    young: float | None = None
+    """Young's modulus [Pa]; by default rho g z N_q / E is 0.5 % at the reading."""
+    courant: float = 0.3
+    """Time step, in cells per wave."""
+    shift: float = 0.0
+    """Place of the plate on the grid, along x and y [cells]."""
+    bed: float = 1.0
+    """Factor on the margins of sand around the plate."""
+    ppc: int = 2
+    """Particles per cell along each axis."""
+    xpic: int = 0
+    """Order of XPIC; 0 is FLIP."""
+    symmetric: bool = True
+    """In 3D, model a half or a quarter where the rest is its mirror image."""
+
+    def __post_init__(self) -> None:
+        if self.dim not in (2, 3):
+            raise MpmError(f"dim must be 2 or 3, not {self.dim}")
+        if self.dim == 2 and self.psi:
+            raise MpmError("psi needs dim 3")
+        if not -90.0 <= self.beta <= 90.0 or not -90.0 <= self.gamma <= 90.0 or not -180.0 <= self.psi <= 180.0:
+            raise MpmError("beta and gamma must be in [-90, 90] degrees and psi in [-180, 180]")
+        for name in ("rho", "length", "speed", "bed", "courant", "mu_int"):
+            if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0.0):
+                raise MpmError(f"{name} must be positive and finite, not {getattr(self, name):g}")
+        for name in ("thickness", "depth", "young"):
+            value = getattr(self, name)
+            if value is not None and not (math.isfinite(value) and value > 0.0):
+                raise MpmError(f"{name} must be positive and finite, not {value:g}")
+        if not 4.0 <= self.cells <= 200.0:
+            raise MpmError(f"cells must be in [4, 200], not {self.cells:g}")
+        if not (math.isfinite(self.mu_surf) and self.mu_surf >= 0.0):
+            raise MpmError(f"mu_surf must be zero or positive, not {self.mu_surf:g}")
+        if self.ppc < 1 or self.xpic < 0:
+            raise MpmError("ppc must be at least 1 and xpic at least 0")
+        if self.thick < 1.06 * self.dx:
+            raise MpmError(
+                f"a plate of {self.thick:g} m is thinner than a cell of {self.dx:g} m: more cells or thickness"
+            )
+
+    @property
+    def dx(self) -> float:
+        """Size of a cell [m]."""
+        return self.length / self.cells
+
+    @property
+    def thick(self) -> float:
+        """Thickness of the plate [m]."""
+        return self.thickness or (0.3 if self.dim == 2 else 0.2) * self.length
+
+    @property
+    def z(self) -> float:
+        """Depth of the reading [m]."""
+        return self.depth or 0.4 * self.length
+
+    @property
+    def area(self) -> float:
+        """Of one face [m^2], in the plane a length [m]."""
+        return self.length if self.dim == 2 else self.length**2
+
+    @property
+    def material(self) -> Material:
+        """The sand."""
+        young = self.young or stiffness(self.rho, 9.81, self.z, self.mu_int, 0.005)
+        return Material.of_density(self.mu_int, self.rho, young)
+
+    @property
+    def direction(self) -> Array:
+        """Of the motion, (dim,)."""
+        g = math.radians(self.gamma)
+        along = [math.cos(g), 0.0, -math.sin(g)]
+        return np.array(along if self.dim == 3 else along[::2])
+
+    @property
+    def rotation(self) -> Array:
+        """Of the plate, whose own lower face looks down."""
+        b, p = math.radians(self.beta), math.radians(self.psi)
+        if self.dim == 2:
+            return plane_rotation(-b)
+        return turned(turned(np.eye(3), np.array([0.0, -b, 0.0])), np.array([0.0, 0.0, p]))
+
+
+class PlateForce(NamedTuple):
+    """What one plate felt."""
+
+    force: Array
+    """Of the sand on the plate at the reading, (dim,) [N, in the plane N/m]."""
+    alpha: Array
+    """Force per area and depth, (dim,) [N/m^3]."""
+    depth: float
+    """Of the leading face's centre [m]."""
+    noise: float
+    """Of averages over 0.5 ms, relative [-]."""
+    history: History
+    profile: tuple[Array, Array]
+    """Mean stress on the surface while reading: places in the plate's frame [m] and stresses [Pa], (n, dim) both."""
+    particles: int
+    steps: int
+    seconds: float
+    """Of computing."""
+
+
+def prepare(plate: Plate) -> tuple[Simulation, float, NDArray[np.bool_]]:
+    """The bed with the plate at its start.
+
+    Returns:
+        The simulation, the travel at the reading [m], and for each horizontal axis whether the plate is cut in half by
+        a mirror.
+    """
+    dim, dx, size = plate.dim, plate.dx, plate.length
+    shape = box(*([size] * (dim - 1)), plate.thick)
+    rotation, direction = plate.rotation, plate.direction
+    corners = shape.vertices @ rotation.T
+    down = rotation[:, -1] * (-1.0 if -rotation[:, -1] @ direction >= -1e-12 else 1.0)
+    face = 0.5 * plate.thick * down  # centre of the leading face, from the plate's own
+    above = plate.z + face[-1] - corners[:, -1].min()  # of the plate's lowest point on its way down to the reading
+    from_surface = above / -direction[-1] if direction[-1] < 0.0 else math.inf
+    approach = from_surface if from_surface <= size else 0.6 * size
+    window = 0.05 * size
+    margin = plate.bed * spread(plate.mu_int) * size * (1.0 if dim == 2 else 0.6)
+    reach = np.abs(corners).max(axis=0)
+    sideways = abs(direction[0]) * (approach + window)
+    mirror_x = dim == 3 and plate.symmetric and plate.beta == 0.0 and abs(plate.gamma) == 90.0 and plate.psi == 0.0
+    mirror_y = dim == 3 and plate.symmetric and plate.psi in (0.0, 180.0, -180.0)
+    height = math.ceil((plate.z + max(reach[-1], 0.4 * size) + 0.6 * margin) / dx) * dx
+    width = [(margin + reach[0] + sideways) if mirror_x else 2.0 * (margin + reach[0]) + sideways]
+    if dim == 3:
+        width.append((1.0 if mirror_y else 2.0) * (margin + reach[1]))
+    width = [math.ceil(w / dx) * dx for w in width]
+    middle = np.array([0.0 if mirror_x else margin + reach[0] + (sideways if direction[0] < 0.0 else 0.0)] + (
+        [0.0 if mirror_y else margin + reach[1]] if dim == 3 else []
+    ))  # fmt: skip
+    mirrors = np.array([mirror_x, mirror_y][: dim - 1])
+    middle = np.where(mirrors, 0.0, np.rint(middle / dx) * dx + plate.shift * dx)
+    reading_at = np.array([*middle, height - plate.z]) - face
+    start = reading_at - approach * direction
+    start[: dim - 1] += np.where(mirrors, 0.0, approach * direction[: dim - 1])
+    body = Body(shape, start, plate.speed * direction, plate.mu_surf, rotation)
+    top = max(height + 0.5 * size, start[-1] + reach[-1] + 2 * dx, height - plate.z + 2.0 * reach[-1] + size)
+    material = plate.material
+    bed = level_bed(material, (*width, height), dx, ppc=plate.ppc)
+    dt = plate.courant * dx / material.wave_speed
+    sim = Simulation(material, bed, dx, (*width, top), bodies=[body], dt=dt, xpic=plate.xpic)
+    sim.clear_bodies()
+    return sim, approach, mirrors
+
+
+def measure(plate: Plate, watch: Watch | None = None) -> PlateForce:
+    """Move the plate to a little beyond the reading.
+
+    Args:
+        plate: What to do.
+        watch: Called after each step with the simulation and the share of the way that is done.
+    """
+    sim, approach, mirrors = prepare(plate)
+    share = 0.5 ** int(mirrors.sum())
+    window = 0.05 * plate.length
+    first = sim.bodies[0].position.copy()
+    descent = -float(plate.direction[-1])
+    log, profile = Log(), Profile(sim.bodies[0], plate.dx)
+    began, travel = time.perf_counter(), 0.0
+    while travel < approach + window:
+        sim.step()
+        travel = float((sim.bodies[0].position - first) @ plate.direction)
+        depth = plate.z + (travel - approach) * descent
+        log.add(sim.time, travel, depth, sim.force[0] / share, sim.moment[0] / share)
+        if abs(travel - approach) <= window:
+            profile.add(sim.contacts[0].place, sim.contacts[0].force)
+        if watch is not None:
+            watch(sim, min(1.0, travel / (approach + window)))
+    history = log.history(plate.dim)
+    history.force[:, : plate.dim - 1][:, mirrors] = 0.0  # the image's share cancels it
+    force, noise = read(history, approach, window)
+    return PlateForce(
+        force=force,
+        alpha=force / (plate.area * plate.z),
+        depth=plate.z,
+        noise=noise,
+        history=history,
+        profile=profile.mean(),
+        particles=len(sim.particles),
+        steps=sim.steps,
+        seconds=time.perf_counter() - began,
+    )
+
+
+class Profile:
+    """Mean stress on patches of a body's surface, about a cell long each."""
+
+    def __init__(self, body: Body, dx: float) -> None:
+        self._places, self._areas = patches(body.shape.vertices, body.shape.faces, dx)
+        self._sum, self._count = np.zeros_like(self._places), 0
+
+    def add(self, place: Array, force: Array) -> None:
+        """One step's contacts, each given to the nearest patch."""
+        self._count += 1
+        if len(place):
+            nearest = ((place[:, None, :] - self._places[None]) ** 2).sum(axis=2).argmin(axis=1)
+            np.add.at(self._sum, nearest, force)
+
+    def mean(self) -> tuple[Array, Array]:
+        """Centres of the patches [m] and mean stress on each [Pa], in the body's frame."""
+        return self._places, self._sum / self._areas[:, None] / max(self._count, 1)
+
+
+def patches(vertices: Array, faces: NDArray[np.int64], size: float) -> tuple[Array, Array]:
+    """Cut edges or triangles into pieces of about `size` [m]: their centres and their lengths or areas."""
+    places: list[Array] = []
+    areas: list[float] = []
+    for corners in vertices[faces]:
+        longest = max(float(np.linalg.norm(corners[i] - corners[i - 1])) for i in range(len(corners)))
+        n = max(1, math.ceil(longest / size))
+        if len(corners) == 2:
+            share = (np.arange(n) + 0.5) / n
+            places += list(corners[0] + share[:, None] * (corners[1] - corners[0]))
+            areas += [longest / n] * n
+            continue
+        a, b, c = corners
+        area = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a))) / n**2
+        for i in range(n):
+            for j in range(n - i):
+                places.append(a + (b - a) * ((i + 1 / 3) / n) + (c - a) * ((j + 1 / 3) / n))
+                if j < n - i - 1:
+                    places.append(a + (b - a) * ((i + 2 / 3) / n) + (c - a) * ((j + 2 / 3) / n))
+        areas += [area] * n**2
+    return np.array(places), np.array(areas)
+
+
+def spread(mu: float) -> float:
+    """How far to either side sand fails under a plate, in plate lengths, and one more: Prandtl's mechanism."""
+    phi = math.atan(mu)
+    return 1.0 + math.tan(math.pi / 4 + phi / 2) * math.exp(0.5 * math.pi * mu)
+
+
+def finer(plate: Plate) -> Plate:
+    """The plate of the second resolution: twice the cells in the plane, half as many again in space."""
+    return dataclasses.replace(plate, cells=plate.cells * (2.0 if plate.dim == 2 else 1.5))
+
+
+def extrapolated(coarse: PlateForce, fine: PlateForce, ratio: float) -> Array:
+    """Force in the limit of vanishing cells, (dim,)."""
+    return limit(coarse.force, fine.force, ratio)

@@ -1,0 +1,76 @@
+"""Forces read from a run: averages over half a millisecond, a straight line through a window, and what is left over."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rftsim_mpm.errors import MpmError
+
+Array = NDArray[np.float64]
+
+AVERAGE = 0.5e-3
+"""Length of the averages [s]."""
+
+
+class History(NamedTuple):
+    """Averages of one body's force over AVERAGE."""
+
+    travel: Array
+    """Distance moved, (n,) [m]."""
+    depth: Array
+    """Depth of the point that the study reads at, (n,) [m]."""
+    force: Array
+    """Of the sand on the body, (n, dim) [N, in the plane N/m]."""
+    moment: Array
+    """About the body's origin, (n, 1 or 3) [N m]."""
+
+
+class Reading(NamedTuple):
+    """Force at one place on the way."""
+
+    force: Array
+    """(dim,)."""
+    noise: float
+    """Standard deviation of the averages about the line, relative to the force [-]."""
+
+
+class Log:
+    """Collects forces step by step and averages them."""
+
+    def __init__(self) -> None:
+        self._rows: list[Array] = []
+        self._open: list[Array] = []
+        self._until = AVERAGE
+
+    def add(self, time: float, travel: float, depth: float, force: Array, moment: Array) -> None:
+        """One step's force."""
+        self._open.append(np.concatenate([[travel, depth], force, moment]))
+        if time >= self._until:
+            self._rows.append(np.mean(self._open, axis=0))
+            self._open.clear()
+            self._until = time + AVERAGE
+
+    def history(self, dim: int) -> History:
+        """What was collected, whole averages only."""
+        rows = np.array(self._rows).reshape(len(self._rows), -1)
+        return History(rows[:, 0], rows[:, 1], rows[:, 2 : 2 + dim], rows[:, 2 + dim :])
+
+
+def read(history: History, travel: float, window: float) -> Reading:
+    """The force at a travel [m]: the value there of a straight line through the averages within `window` [m]."""
+    near = np.abs(history.travel - travel) <= window
+    if near.sum() < 5:
+        raise MpmError(
+            f"only {near.sum()} averages of {AVERAGE * 1e3:g} ms lie within {window:g} m of {travel:g} m: go slower"
+        )
+    basis = np.column_stack([np.ones(near.sum()), history.travel[near] - travel])
+    line, *_ = np.linalg.lstsq(basis, history.force[near], rcond=None)
+    rest = history.force[near] - basis @ line
+    size = float(np.linalg.norm(line[0]))
+    return Reading(line[0], float(np.linalg.norm(rest.std(axis=0))) / size if size else 0.0)
+
+
+def limit(coarse: Array, fine: Array, ratio: float) -> Array:
+    """The limit of vanishing cells, from two resolutions that differ by `ratio`, by an error of first order."""
+    return fine + (fine - coarse) / (ratio - 1.0)
