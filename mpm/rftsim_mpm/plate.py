@@ -124,7 +124,7 @@ class Plate:
         """Of the motion, (dim,)."""
         g = math.radians(self.gamma)
         along = [math.cos(g), 0.0, -math.sin(g)]
-        return np.array(along if self.dim == 3 else along[::2])
+        return np.array(along if self.dim == 3 else along[::2]).round(15)  # cos 90 degrees is nothing
 
     @property
     def rotation(self) -> Array:
@@ -178,24 +178,24 @@ def prepare(plate: Plate) -> tuple[Simulation, float, NDArray[np.bool_]]:
     mirror_x = dim == 3 and plate.symmetric and plate.beta == 0.0 and abs(plate.gamma) == 90.0 and plate.psi == 0.0
     mirror_y = dim == 3 and plate.symmetric and plate.psi in (0.0, 180.0, -180.0)
     height = math.ceil((plate.z + max(reach[-1], 0.4 * size) + 0.6 * margin) / dx) * dx
-    width = [(margin + reach[0] + sideways) if mirror_x else 2.0 * (margin + reach[0]) + sideways]
-    if dim == 3:
-        width.append((1.0 if mirror_y else 2.0) * (margin + reach[1]))
-    width = [math.ceil(w / dx) * dx for w in width]
-    middle = np.array([0.0 if mirror_x else margin + reach[0] + (sideways if direction[0] < 0.0 else 0.0)] + (
-        [0.0 if mirror_y else margin + reach[1]] if dim == 3 else []
-    ))  # fmt: skip
+    beside = [math.ceil((margin + r) / dx) for r in reach[: dim - 1]]  # cells from the plate's middle to a wall
+    path = math.ceil(sideways / dx)
+    width = [(1 if mirror else 2) * n for mirror, n in zip((mirror_x, mirror_y), beside, strict=False)]
+    width[0] += path
+    middle = np.array(beside, float) * dx
+    if direction[0] < 0.0:
+        middle[0] += path * dx
     mirrors = np.array([mirror_x, mirror_y][: dim - 1])
-    middle = np.where(mirrors, 0.0, np.rint(middle / dx) * dx + plate.shift * dx)
+    middle = np.where(mirrors, 0.0, middle + plate.shift * dx)
     reading_at = np.array([*middle, height - plate.z]) - face
     start = reading_at - approach * direction
     start[: dim - 1] += np.where(mirrors, 0.0, approach * direction[: dim - 1])
     body = Body(shape, start, plate.speed * direction, plate.mu_surf, rotation)
     top = max(height + 0.5 * size, start[-1] + reach[-1] + 2 * dx, height - plate.z + 2.0 * reach[-1] + size)
     material = plate.material
-    bed = level_bed(material, (*width, height), dx, ppc=plate.ppc)
+    bed = level_bed(material, (*(n * dx for n in width), height), dx, ppc=plate.ppc)
     dt = plate.courant * dx / material.wave_speed
-    sim = Simulation(material, bed, dx, (*width, top), bodies=[body], dt=dt, xpic=plate.xpic)
+    sim = Simulation(material, bed, dx, (*(n * dx for n in width), top), bodies=[body], dt=dt, xpic=plate.xpic)
     sim.clear_bodies()
     return sim, approach, mirrors
 

@@ -11,7 +11,7 @@ from rich.console import Console
 from rftsim_mpm.cli.report import print_json, progress
 from rftsim_mpm.fields import Camera, Frame
 from rftsim_mpm.output import check_writable, replacing
-from rftsim_mpm.plate import Plate, PlateForce, coarser, extrapolated, measure
+from rftsim_mpm.plate import Plate, PlateForce, extrapolated, finer, measure
 from rftsim_mpm.simulation import Simulation
 
 
@@ -24,7 +24,7 @@ class PlateCommand:
 
     plate: tyro.conf.OmitArgPrefixes[Plate] = dataclasses.field(default_factory=Plate)
     extrapolate: bool = False
-    """Also run fewer cells, and give the limit."""
+    """Also run more cells (twice, in 3D one and a half times as many), and give the limit."""
     quick: bool = False
     """Six cells, and less sand around: a look, not a measurement."""
     json: bool = False
@@ -41,13 +41,13 @@ class PlateCommand:
         if self.record:
             check_writable(self.record, ".rrd")
         plate = dataclasses.replace(self.plate, cells=6.0, bed=0.7 * self.plate.bed) if self.quick else self.plate
-        second = coarser(plate) if self.extrapolate else None
+        second = finer(plate) if self.extrapolate else None
         found, frame = self._run(plate)
         report = _report(plate, found)
         if second is not None:
             other, _ = self._run(second, picture=False)
-            force = extrapolated(other, found, plate.cells / second.cells)
-            report["coarse"] = {"cells": second.cells, "force": other.force.tolist(), "noise": other.noise}
+            force = extrapolated(found, other, second.cells / plate.cells)
+            report["fine"] = {"cells": second.cells, "force": other.force.tolist(), "noise": other.noise}
             report["limit"] = {"force": force.tolist(), "alpha": (force / (plate.area * plate.z)).tolist()}
         if self.plot and frame is not None:
             from rftsim_mpm.plots import plot_history  # matplotlib is an extra
@@ -123,9 +123,9 @@ def _print(plate: Plate, report: dict[str, Any]) -> None:
     names = "xyz" if plate.dim == 3 else "xz"
     rows = [("", report["force"], report["alpha_N_m3"])]
     if "limit" in report:
-        coarse = np.array(report["coarse"]["force"])
+        fine = np.array(report["fine"]["force"])
         rows += [
-            (f"{report['coarse']['cells']:g} cells: ", coarse, coarse / (plate.area * plate.z)),
+            (f"{report['fine']['cells']:g} cells: ", fine, fine / (plate.area * plate.z)),
             ("limit: ", report["limit"]["force"], report["limit"]["alpha"]),
         ]
     for label, force, alpha in rows:
