@@ -24,6 +24,9 @@ from rftsim_mpm.simulation import Simulation
 Array = NDArray[np.float64]
 Watch = Callable[[Simulation, float], None]
 
+BURIED = 0.6
+"""Travel before the reading of a plate that starts in the sand [plate lengths]."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Plate:
@@ -109,6 +112,11 @@ class Plate:
         return self.depth or 0.4 * self.length
 
     @property
+    def window(self) -> float:
+        """Half of the travel over which the force is read [m]: a twentieth of the length, and at least 4 ms."""
+        return max(0.05 * self.length, 4e-3 * self.speed)
+
+    @property
     def area(self) -> float:
         """Of one face [m^2], in the plane a length [m]."""
         return self.length if self.dim == 2 else self.length**2
@@ -155,7 +163,7 @@ class PlateForce(NamedTuple):
     """Of computing."""
 
 
-def prepare(plate: Plate) -> tuple[Simulation, float, NDArray[np.bool_]]:
+def prepare(plate: Plate, buried: float = BURIED) -> tuple[Simulation, float, NDArray[np.bool_]]:
     """The bed with the plate at its start.
 
     Returns:
@@ -170,8 +178,8 @@ def prepare(plate: Plate) -> tuple[Simulation, float, NDArray[np.bool_]]:
     face = 0.5 * plate.thick * down  # centre of the leading face, from the plate's own
     above = plate.z + face[-1] - corners[:, -1].min()  # of the plate's lowest point on its way down to the reading
     from_surface = above / -direction[-1] if direction[-1] < 0.0 else math.inf
-    approach = from_surface if from_surface <= size else 0.6 * size
-    window = 0.05 * size
+    approach = from_surface if from_surface <= size else buried * size
+    window = plate.window
     margin = plate.bed * spread(plate.mu_int) * size * (1.0 if dim == 2 else 0.6)
     reach = np.abs(corners).max(axis=0)
     sideways = abs(direction[0]) * (approach + window)
@@ -200,16 +208,17 @@ def prepare(plate: Plate) -> tuple[Simulation, float, NDArray[np.bool_]]:
     return sim, approach, mirrors
 
 
-def measure(plate: Plate, watch: Watch | None = None) -> PlateForce:
+def measure(plate: Plate, watch: Watch | None = None, buried: float = BURIED) -> PlateForce:
     """Move the plate to a little beyond the reading.
 
     Args:
         plate: What to do.
         watch: Called after each step with the simulation and the share of the way that is done.
+        buried: Travel before the reading of a plate that does not start at the surface [plate lengths].
     """
-    sim, approach, mirrors = prepare(plate)
+    sim, approach, mirrors = prepare(plate, buried)
     share = 0.5 ** int(mirrors.sum())
-    window = 0.05 * plate.length
+    window = plate.window
     first = sim.bodies[0].position.copy()
     descent = -float(plate.direction[-1])
     log, profile = Log(), Profile(sim.bodies[0], plate.dx)

@@ -121,3 +121,58 @@ def plot_campaign(found: list[dict[str, Any]], path: Path) -> None:
         axis.grid(alpha=0.3)
     axes[-1].legend(fontsize=7, loc="center left", bbox_to_anchor=(1.0, 0.5))
     figure.savefig(path)
+
+
+def plot_drag(depth: Any, speed: Any, drag: Any, fit: Any, path: Path) -> None:
+    """Draw drag against speed, a colour for each depth, and the fit K z + lambda rho L v^2 as lines."""
+    figure = Figure(figsize=(7, 5), dpi=110, layout="constrained")
+    axes = figure.subplots()
+    fine = np.linspace(0.0, speed.max(), 100)
+    for colour, z in enumerate(sorted(set(depth.tolist()))):
+        own = depth == z
+        axes.plot(speed[own], drag[own], "o", color=f"C{colour}", label=f"{1e3 * z:g} mm")
+        axes.plot(fine, fit(z, fine), ":", color=f"C{colour}")
+    axes.set_xlabel("speed [m/s]")
+    axes.set_ylabel("drag [N/m]")
+    axes.grid(alpha=0.3)
+    axes.legend(title="depth")
+    figure.savefig(path)
+
+
+def plot_wheel(time: Any, velocity: Any, height: Any, frame: Frame, title: str, path: Path) -> None:
+    """Draw speed and height of a wheel against time, and the sand at the end."""
+    figure = Figure(figsize=(13, 9), dpi=110, layout="constrained")
+    grid = figure.add_gridspec(3, 2)
+    axes = [figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[0, 1])]
+    axes[0].plot(time, velocity)
+    axes[0].set_ylabel("speed [m/s]")
+    axes[1].plot(time, 1e3 * height)
+    axes[1].set_ylabel("sinkage [mm]")
+    for axis in axes:
+        axis.set_xlabel("time [s]")
+        axis.grid(alpha=0.3)
+    for row, field in enumerate(("rate", "velocity"), start=1):
+        draw_field(figure.add_subplot(grid[row, :], anchor="W"), frame, field)
+    figure.suptitle(title)
+    figure.savefig(path)
+
+
+def plot_lines(
+    lines: list[tuple[str, Any, Any]], labels: tuple[str, str], frames: list[tuple[str, Frame, str]], path: Path
+) -> None:
+    """Draw some curves, and below them some frames, each with its title and its field."""
+    rows = (len(frames) + 1) // 2
+    figure = Figure(figsize=(13, 4.5 + 3.2 * rows), dpi=110, layout="constrained")
+    grid = figure.add_gridspec(1 + rows, 2)
+    axes = figure.add_subplot(grid[0, :])
+    for name, x, y in lines:
+        axes.plot(x, y, label=name, marker="o" if len(x) < 30 else None, linewidth=1.0)
+    axes.set_xlabel(labels[0])
+    axes.set_ylabel(labels[1])
+    axes.grid(alpha=0.3)
+    axes.legend(fontsize=8)
+    for i, (title, frame, field) in enumerate(frames):
+        axis = figure.add_subplot(grid[1 + i // 2, i % 2])
+        draw_field(axis, frame, field)
+        axis.set_title(title, fontsize=9)
+    figure.savefig(path)

@@ -1,0 +1,306 @@
+"""The four verification cases of [Agarwal] section 2.4."""
+
+import dataclasses
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rftsim_mpm.bed import level_bed
+from rftsim_mpm.body import Body
+from rftsim_mpm.errors import MpmError
+from rftsim_mpm.fields import Frame
+from rftsim_mpm.follow import Track, Watch, follow
+from rftsim_mpm.material import Material, stiffness
+from rftsim_mpm.shapes import box, disc
+from rftsim_mpm.simulation import Simulation
+
+Array = NDArray[np.float64]
+GRAVITY = 9.8
+"""As in the source [m/s^2]."""
+
+
+def part(watch: Watch | None, index: int, count: int) -> Watch | None:
+    """A watch of one run out of several."""
+    return None if watch is None else lambda sim, share: watch(sim, (index + share) / count)
+
+
+@dataclasses.dataclass(frozen=True)
+class CylinderDrag:
+    """Case 1: a cylinder dragged at several depths (NDPM)."""
+
+    depths: tuple[float, ...] = (0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0.07)
+    """Of the axis [m]."""
+    diameter: float = 0.004
+    """[m]."""
+    cells: float = 5.0
+    """Cells per diameter; the source has 8."""
+    speed: float = 0.15
+    """[m/s]."""
+    travel: float = 3.0
+    """[diameters]."""
+    mu_int: float = 0.48
+    mu_surf: float = 0.35
+    rho: float = 1512.0
+    """[kg/m^3]."""
+    width: float = 0.1
+    """Of the bed [m]; the source has 0.20 x 0.16."""
+
+
+class CylinderForces(NamedTuple):
+    """Drag and lift over pi (D/2)^2 rho g, the means of the last 40 % of the way."""
+
+    depth: Array
+    drag: Array
+    lift: Array
+    r_squared: float
+    """Of a straight line through the drag."""
+    frames: list[Frame]
+
+
+def cylinder_drag(study: CylinderDrag, watch: Watch | None = None) -> CylinderForces:
+    """Run case 1."""
+    if len(study.depths) < 3 or min(study.depths) < 1.5 * study.diameter:
+        raise MpmError("case 1 needs three or more depths, each at least 1.5 diameters")
+    dx = study.diameter / study.cells
+    unit = math.pi * (study.diameter / 2.0) ** 2 * study.rho * GRAVITY
+    forces, frames = [], []
+    for i, depth in enumerate(study.depths):
+        young = stiffness(study.rho, GRAVITY, depth, study.mu_int, 0.01)
+        material = Material.of_density(study.mu_int, study.rho, young)
+        size = tuple(math.ceil(s / dx) * dx for s in (study.width, depth + 8.0 * study.diameter))
+        bed = level_bed(material, size, dx, gravity=GRAVITY)
+        place = np.array([0.5 * size[0], size[1] - depth])
+        body = Body(disc(study.diameter / 2.0), place, np.array([study.speed, 0.0]), study.mu_surf)
+        top = size[1] + 4.0 * study.diameter
+        sim = Simulation(material, bed, dx, (size[0], top), bodies=[body], gravity=GRAVITY, wall_friction=study.mu_surf)
+        sim.clear_bodies()
+        duration = study.travel * study.diameter / study.speed
+        track = follow(sim, duration, part(watch, i, len(study.depths)))
+        forces.append(track.after(0.6 * duration).force[:, 0].mean(axis=0) / unit)
+        frames.append(track.frames[-1])
+    depths, force = np.array(study.depths), np.array(forces)
+    line = np.polyval(np.polyfit(depths, -force[:, 0], 1), depths)
+    rest = ((-force[:, 0] - line) ** 2).sum() / ((force[:, 0] - force[:, 0].mean()) ** 2).sum()
+    return CylinderForces(depths, -force[:, 0], force[:, 1], 1.0 - float(rest), frames)
+
+
+@dataclasses.dataclass(frozen=True)
+class Plates:
+    """Case 2: one plate of several lengths, and two side by side (NDPM)."""
+
+    lengths: tuple[float, ...] = (0.05, 0.1, 0.15, 0.2, 0.25)
+    """Of single plates [m]."""
+    gaps: tuple[float, ...] = (0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0, 2.0)
+    """Between two plates of `pair`, in their lengths [-]."""
+    pair: float = 0.1
+    """Length of each of two plates [m]."""
+    depth: float = 0.08
+    """[m]."""
+    dx: float = 0.005
+    """[m]; the source has 0.00125."""
+    speed: float = 0.2
+    """[m/s]; the source has 0.1."""
+    mu_int: float = 0.4
+    mu_surf: float = 0.35
+    rho: float = 1512.0
+    """[kg/m^3]."""
+    bed: tuple[float, float] = (1.2, 0.6)
+    """[m]."""
+
+
+class PlatesForces(NamedTuple):
+    """What the plates of case 2 felt."""
+
+    curves: list[tuple[Array, Array]]
+    """Depth [m] and force [N/m] of each single plate."""
+    peak: Array
+    """First peak, the highest force above L/5 [N/m]."""
+    deep: Array
+    """Mean over the last quarter of the way [N/m]."""
+    peak_exponent: float
+    """Of L."""
+    deep_exponent: float
+    pair: Array
+    """Mean force on each of two plates, over the last quarter, for each gap [N/m]."""
+    frame: Frame
+
+
+def plates(study: Plates, watch: Watch | None = None) -> PlatesForces:
+    """Run case 2."""
+    if len(study.lengths) < 2:
+        raise MpmError("case 2 needs two or more lengths for its exponents")
+    count = len(study.lengths) + len(study.gaps)
+    curves, pairs = [], []
+    for i, length in enumerate(study.lengths):
+        track = _push(study, [0.0], length, part(watch, i, count))
+        curves.append((track.time * study.speed, track.force[:, 0, 1]))
+    for i, gap in enumerate(study.gaps):
+        offset = 0.5 * (1.0 + gap) * study.pair
+        track = _push(study, [-offset, offset], study.pair, part(watch, len(study.lengths) + i, count))
+        last = track.after(0.75 * track.time[-1])
+        pairs.append(float(last.force[:, :, 1].mean()))
+    lengths = np.array(study.lengths)
+    peak = np.array([f[z < length / 5.0].max() for length, (z, f) in zip(lengths, curves, strict=True)])
+    deep = np.array([f[z > 0.75 * study.depth].mean() for z, f in curves])
+    slopes = [float(np.polyfit(np.log(lengths), np.log(f), 1)[0]) for f in (peak, deep)]
+    return PlatesForces(curves, peak, deep, slopes[0], slopes[1], np.array(pairs), track.frames[-1])
+
+
+def _push(study: Plates, offsets: list[float], length: float, watch: Watch | None) -> Track:
+    young = stiffness(study.rho, GRAVITY, study.depth, study.mu_int, 0.01)
+    material = Material.of_density(study.mu_int, study.rho, young)
+    size = tuple(math.ceil(s / study.dx) * study.dx for s in study.bed)
+    bed = level_bed(material, size, study.dx, gravity=GRAVITY)
+    shape = box(length, 4.0 * study.dx)
+    bodies = [
+        Body(
+            shape, np.array([0.5 * size[0] + o, size[1] + 2.0 * study.dx]), np.array([0.0, -study.speed]), study.mu_surf
+        )
+        for o in offsets
+    ]
+    box_size = (size[0], size[1] + study.depth + 8.0 * study.dx)
+    sim = Simulation(material, bed, study.dx, box_size, bodies=bodies, gravity=GRAVITY, wall_friction=study.mu_surf)
+    return follow(sim, study.depth / study.speed, watch)
+
+
+@dataclasses.dataclass(frozen=True)
+class Plowing:
+    """Case 3: a plate plowing sand of several packings (DPM)."""
+
+    packings: tuple[float, ...] = (0.57, 0.59, 0.61, 0.63)
+    """Initial packing fractions [-]."""
+    chi: float = 2.5
+    """2.5 in the source's text, 5.0 in its captions [-]."""
+    dx: float = 0.006
+    """[m]; the source has 0.004."""
+    bed: tuple[float, float] = (1.2, 0.2)
+    """[m]; the source has 2.4 x 0.4."""
+    depth: float = 0.05
+    """Of the plate's lower edge [m]."""
+    travel: float = 0.5
+    """[m]."""
+    speed: float = 0.2
+    """[m/s]."""
+    mu_int: float = 0.4
+    mu_surf: float = 0.35
+
+
+class PlowingForces(NamedTuple):
+    """Drag against travel, and how it fluctuates."""
+
+    travel: Array
+    drag: list[Array]
+    """Of each packing [N/m]."""
+    mean: Array
+    fluctuation: Array
+    """Standard deviation about a smooth trend over the last half, after averaging over 2 mm, relative [-]."""
+    frames: list[Frame]
+
+
+def plowing(study: Plowing, watch: Watch | None = None) -> PlowingForces:
+    """Run case 3."""
+    drags, frames, means, sizes = [], [], [], []
+    travel = np.zeros(0)
+    for i, phi in enumerate(study.packings):
+        material = Material(study.mu_int, chi=study.chi, young=stiffness(1512.0, GRAVITY, study.depth, 0.5, 0.01))
+        size = tuple(math.ceil(s / study.dx) * study.dx for s in study.bed)
+        bed = level_bed(material, size, study.dx, gravity=GRAVITY, phi=phi)
+        place = np.array([0.15, size[1] - study.depth + 0.04])
+        body = Body(box(0.03, 0.08), place, np.array([study.speed, 0.0]), study.mu_surf)
+        sim = Simulation(
+            material,
+            bed,
+            study.dx,
+            (size[0], size[1] + 0.15),
+            bodies=[body],
+            gravity=GRAVITY,
+            wall_friction=study.mu_surf,
+        )
+        sim.clear_bodies()
+        track = follow(sim, study.travel / study.speed, part(watch, i, len(study.packings)))
+        travel, force = track.time * study.speed, -track.force[:, 0, 0]
+        late = travel > 0.5 * study.travel
+        window = np.ones(max(1, round(0.002 / study.speed / 0.5e-3)))
+        smooth = np.convolve(force, window / window.size, "same")[late]
+        trend = np.polyval(np.polyfit(travel[late], smooth, 2), travel[late])
+        inner = slice(window.size, -window.size)
+        drags.append(force)
+        frames.append(track.frames[-1])
+        means.append(smooth.mean())
+        sizes.append((smooth - trend)[inner].std() / smooth.mean())
+    return PlowingForces(travel, drags, np.array(means), np.array(sizes), frames)
+
+
+@dataclasses.dataclass(frozen=True)
+class ShearZone:
+    """Case 4: the rigid wedge that grows under a plate (DPM)."""
+
+    phi: float = 0.55
+    """Initial packing fraction [-]."""
+    dx: float = 0.002
+    """[m]; the source has 0.0005."""
+    bed: tuple[float, float] = (0.5, 0.2)
+    """[m]."""
+    depth: float = 0.04
+    """[m]."""
+    speed: float = 0.15
+    """[m/s]."""
+    mu_int: float = 0.53
+    mu_surf: float = 0.35
+    chi: float = 5.0
+    phi_c: float = 0.60
+    rho_g: float = 1100.0
+    """[kg/m^3]."""
+
+
+class Wedge(NamedTuple):
+    """The sand that moves with the plate, at several moments."""
+
+    time: Array
+    """In plate lengths travelled, t v / L [-]."""
+    height: Array
+    """Below the plate, in plate lengths [-]."""
+    bluntness: Array
+    """Width half way down over width at the plate: one for a rectangle, a half for a triangle."""
+    track: Track
+
+
+def shear_zone(study: ShearZone, watch: Watch | None = None) -> Wedge:
+    """Run case 4."""
+    young = stiffness(study.phi_c * study.rho_g, GRAVITY, study.depth, study.mu_int, 0.01)
+    material = Material(study.mu_int, rho_g=study.rho_g, phi_c=study.phi_c, chi=study.chi, young=young)
+    size = tuple(math.ceil(s / study.dx) * study.dx for s in study.bed)
+    bed = level_bed(material, size, study.dx, gravity=GRAVITY, phi=study.phi)
+    length = 0.04
+    place = np.array([0.5 * size[0], size[1] + 0.01])
+    body = Body(box(length, 0.02), place, np.array([0.0, -study.speed]), study.mu_surf)
+    top = size[1] + study.depth + 0.03
+    sim = Simulation(
+        material, bed, study.dx, (size[0], top), bodies=[body], gravity=GRAVITY, wall_friction=study.mu_surf
+    )
+    duration = study.depth / study.speed
+    shots = [share * duration for share in (0.1, 0.2, 0.35, 0.6)]
+    track = follow(sim, duration, watch, shots)
+    heights, blunt = zip(*(_wedge(frame, study.speed, length, study.dx) for frame in track.frames), strict=True)
+    times = np.array([frame.time for frame in track.frames]) * study.speed / length
+    return Wedge(times, np.array(heights), np.array(blunt), track)
+
+
+def _wedge(frame: Frame, speed: float, length: float, dx: float) -> tuple[float, float]:
+    """Height and bluntness of what moves down with at least 0.8 of the plate's speed."""
+    outline = frame.outlines[0]
+    base, middle = outline[:, 1].min(), outline[:, 0].mean()
+    near = (np.abs(frame.place[:, 0] - middle) < 0.6 * length) & (frame.place[:, 1] < base)
+    rigid = near & (frame.velocity[:, -1] < -0.8 * speed)
+    if rigid.sum() < 10:
+        return 0.0, 1.0
+    below = base - frame.place[rigid, 1]
+    rows = np.floor(below / dx).astype(int)
+    widths = np.array([np.ptp(frame.place[rigid, 0][rows == r]) + 0.5 * dx if (rows == r).sum() > 1 else 0.0 for r in
+                       range(rows.max() + 1)])  # fmt: skip
+    # The wedge ends where its width first falls below two cells: what moves further down is not part of it.
+    narrow = np.flatnonzero(widths[1:] < 2.0 * dx)
+    count = int(narrow[0]) + 1 if narrow.size else len(widths)
+    return count * dx / length, float(widths[count // 2] / max(widths[: max(2, count // 4)].max(), dx))

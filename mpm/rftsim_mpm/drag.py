@@ -1,0 +1,94 @@
+"""A thin upright plate dragged through sand at several depths and speeds: [Agarwal] section 4.7.
+
+F = K z + lambda rho L v^2 per metre of width: what dynamic force laws take their inertial term from.
+"""
+
+import dataclasses
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rftsim_mpm.errors import MpmError
+from rftsim_mpm.plate import Plate, PlateForce, measure
+from rftsim_mpm.simulation import Simulation
+
+Array = NDArray[np.float64]
+
+
+@dataclasses.dataclass(frozen=True)
+class Drag:
+    """Plates of [Agarwal] Fig. 4-8; the internal friction is not given there."""
+
+    length: float = 0.016
+    """Height of the plate [m]."""
+    rho: float = 900.0
+    """Critical density of the sand [kg/m^3]."""
+    mu_int: float = 0.4
+    """Internal friction of the sand [-]."""
+    mu_surf: float = 0.35
+    """Friction between sand and plate [-]."""
+    depths: tuple[float, ...] = (0.02, 0.03, 0.04)
+    """Of the plate's centre [m]."""
+    speeds: tuple[float, ...] = (0.1, 0.32, 0.64)
+    """[m/s]."""
+    cells: float = 10.0
+    """Cells per plate length."""
+
+    def plates(self) -> list[Plate]:
+        """One plate for each depth and speed."""
+        if len(set(self.depths)) < 2 or len(set(self.speeds)) < 2:
+            raise MpmError("drag needs at least two depths and two speeds to fit K and lambda")
+        return [
+            Plate(
+                beta=90.0,
+                gamma=0.0,
+                mu_int=self.mu_int,
+                mu_surf=self.mu_surf,
+                rho=self.rho,
+                length=self.length,
+                depth=depth,
+                speed=speed,
+                cells=self.cells,
+            )
+            for depth in self.depths
+            for speed in self.speeds
+        ]
+
+
+class DragForces(NamedTuple):
+    """Drag of each plate and what it amounts to."""
+
+    depth: Array
+    """(n,) [m]."""
+    speed: Array
+    """(n,) [m/s]."""
+    drag: Array
+    """(n,) [N/m]."""
+    lift: Array
+    """(n,) [N/m]."""
+    stiffness: float
+    """K of F = K z + lambda rho L v^2, by least squares [N/m^2]."""
+    inertia: float
+    """lambda [-]."""
+    runs: list[PlateForce]
+
+
+def drag(study: Drag, watch: Callable[[Simulation, float], None] | None = None) -> DragForces:
+    """Drag all the plates; `watch` is told the share of the whole study that is done."""
+    plates = study.plates()
+    runs = []
+    for i, plate in enumerate(plates):
+        inner = None
+        if watch is not None:
+
+            def inner(sim: Simulation, share: float, i: int = i) -> None:
+                watch(sim, (i + share) / len(plates))
+
+        runs.append(measure(plate, inner, buried=2.5))
+    depth, speed = np.array([plate.z for plate in plates]), np.array([plate.speed for plate in plates])
+    force = np.array([run.force for run in runs])
+    basis = np.column_stack([depth, study.rho * study.length * speed**2])
+    (stiffness, inertia), *_ = np.linalg.lstsq(basis, -force[:, 0], rcond=None)
+    return DragForces(depth, speed, -force[:, 0], force[:, 1], float(stiffness), float(inertia), runs)

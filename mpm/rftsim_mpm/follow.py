@@ -1,0 +1,73 @@
+"""Run a simulation for a while and keep what its bodies did."""
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rftsim_mpm.fields import Camera, Frame
+from rftsim_mpm.reading import AVERAGE
+from rftsim_mpm.simulation import Simulation
+
+Array = NDArray[np.float64]
+Watch = Callable[[Simulation, float], None]
+
+
+class Track(NamedTuple):
+    """Averages over AVERAGE."""
+
+    time: Array
+    """(n,) [s]."""
+    position: Array
+    """Of each body, (n, nbody, dim) [m]."""
+    velocity: Array
+    """(n, nbody, dim) [m/s]."""
+    force: Array
+    """Of the sand on each, (n, nbody, dim) [N, in the plane N/m]."""
+    frames: list[Frame]
+    """At the times asked for, and at the end."""
+
+    def after(self, time: float) -> "Track":
+        """The part from a time [s] on."""
+        keep = self.time >= time
+        return Track(self.time[keep], self.position[keep], self.velocity[keep], self.force[keep], self.frames)
+
+
+def follow(sim: Simulation, duration: float, watch: Watch | None = None, shots: Sequence[float] = ()) -> Track:
+    """Run to a time [s].
+
+    Args:
+        sim: Stepped in place.
+        duration: [s].
+        watch: Called after each step with the simulation and the share that is done.
+        shots: When to take frames [s]; rates in them are means over the 2 % of the run before.
+    """
+    due = [*sorted(shots), duration]
+    cameras: list[Camera | None] = [None] * len(due)
+    frames: list[Frame] = []
+    rows: list[Array] = []
+    open_: list[Array] = []
+    until = AVERAGE
+    while sim.time < duration:
+        sim.step()
+        moved = [part for body in sim.bodies for part in (body.position, body.velocity)]
+        open_.append(np.concatenate([sim.force.ravel(), *moved]))
+        if sim.time >= until:
+            rows.append(np.concatenate([[sim.time], np.mean(open_, axis=0)]))
+            open_.clear()
+            until = sim.time + AVERAGE
+        for i, time in enumerate(due):
+            if cameras[i] is None and sim.time >= time - 0.02 * duration:
+                cameras[i] = Camera(sim)
+        if len(frames) < len(due) and sim.time >= due[len(frames)]:
+            camera = cameras[len(frames)]
+            assert camera is not None
+            frames.append(camera.shoot(sim))
+        if watch is not None:
+            watch(sim, min(1.0, sim.time / duration))
+    bodies, dim = len(sim.bodies), sim.particles.dim
+    table = np.array(rows).reshape(len(rows), -1)
+    ends = np.split(table[:, 1:], [bodies * dim], axis=1)
+    placed = ends[1].reshape(len(rows), bodies, 2, dim)
+    return Track(table[:, 0], placed[:, :, 0], placed[:, :, 1], ends[0].reshape(len(rows), bodies, dim), frames)

@@ -1,0 +1,120 @@
+"""A driven grousered wheel, free to travel and to sink: [Agarwal] section 4.3, Tables 4.1 and 4.2."""
+
+import dataclasses
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from rftsim_mpm.bed import level_bed
+from rftsim_mpm.body import Body
+from rftsim_mpm.errors import MpmError
+from rftsim_mpm.follow import Track, Watch, follow
+from rftsim_mpm.material import Material, stiffness
+from rftsim_mpm.shapes import wheel
+from rftsim_mpm.simulation import Simulation
+
+
+@dataclasses.dataclass(frozen=True)
+class Wheel:
+    """The wheel of Table 4.1 on the poppy seeds of Table 4.2, in plane strain."""
+
+    rpm: float = 30.0
+    """Spin; positive rolls towards +x [1/min]."""
+    duration: float = 3.0
+    """Simulated time [s]."""
+    radius: float = 0.094
+    """Without grousers [m]."""
+    grousers: int = 20
+    height: float = 0.012
+    """Of a grouser [m]."""
+    width: float = 0.006
+    """Of a grouser, along the rim [m]."""
+    breadth: float = 0.14
+    """Of the wheel [m]; masses and forces are divided by it."""
+    mass_x: float = 23.0
+    """Inertia along [kg]."""
+    mass_z: float = 6.3
+    """Inertia and load across [kg]."""
+    push: float = 4.0
+    """Forward force [N]."""
+    mu_int: float = 0.56
+    """Internal friction of the sand [-]."""
+    mu_surf: float = 0.35
+    """Friction between sand and wheel [-]."""
+    rho: float = 638.0
+    """Critical density of the sand, 1100 x 0.58 [kg/m^3]."""
+    dx: float = 0.004
+    """Size of a cell [m]; a grouser must be more than a cell wide."""
+    gravity: float = 9.81
+    """[m/s^2]."""
+
+    def __post_init__(self) -> None:
+        for name in ("duration", "radius", "height", "width", "breadth", "mass_x", "mass_z", "mu_int", "rho", "dx"):
+            if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0.0):
+                raise MpmError(f"{name} must be positive and finite, not {getattr(self, name):g}")
+        if self.grousers < 2 or self.grousers * self.width >= 2.0 * math.pi * self.radius:
+            raise MpmError(f"{self.grousers} grousers of {self.width:g} m do not fit on the wheel; 2 at least")
+
+    @property
+    def outer(self) -> float:
+        """Radius with grousers [m]."""
+        return self.radius + self.height
+
+
+class Rolling(NamedTuple):
+    """Means over the last 40 % of the run."""
+
+    speed: float
+    """[m/s]."""
+    sinkage: float
+    """Of the outer circle below the level surface [m]."""
+    slip: float
+    """1 - v / (omega r), r with grousers [-]."""
+    drop: float
+    """How much lower the surface is behind the wheel than ahead at the end [m]."""
+    track: Track
+
+
+def roll(study: Wheel, watch: Watch | None = None) -> Rolling:
+    """Lower the wheel onto a bed, spin it and let it go."""
+    omega, outer, dx = study.rpm * 2.0 * math.pi / 60.0, study.outer, study.dx
+    depth = math.ceil(1.5 * outer / dx) * dx
+    before = 2.5 * outer
+    length = math.ceil((2.0 * before + abs(omega) * outer * study.duration) / dx) * dx
+    young = stiffness(study.rho, study.gravity, 0.3 * outer, study.mu_int, 0.01)
+    material = Material.of_density(study.mu_int, study.rho, young)
+    weight = study.mass_z * study.gravity
+    body = Body(
+        wheel(study.radius, study.grousers, study.height, study.width),
+        np.array([before if omega >= 0.0 else length - before, depth + outer - 0.5 * study.height]),
+        np.zeros(2),
+        study.mu_surf,
+        spin=np.array([omega]),
+        mass=np.array([study.mass_x, study.mass_z]) / study.breadth,
+        load=np.array([math.copysign(study.push, omega), -weight]) / study.breadth,
+    )
+    bed = level_bed(material, (length, depth), dx, gravity=study.gravity)
+    sim = Simulation(
+        material,
+        bed,
+        dx,
+        (length, depth + 3.0 * outer),
+        bodies=[body],
+        gravity=study.gravity,
+        wall_friction=study.mu_int,
+    )
+    sim.clear_bodies()
+    track = follow(sim, study.duration, watch)
+    steady = track.after(0.6 * study.duration)
+    speed = float(np.mean(steady.velocity[:, 0, 0]))
+    sinkage = depth + outer - float(np.mean(steady.position[:, 0, 1]))
+    surface, middle = track.frames[-1].surface, float(body.position[0])
+    way = math.copysign(1.0, omega)
+    behind, ahead = (
+        surface[(way * s * (surface[:, 0] - middle) > outer) & (way * s * (surface[:, 0] - middle) < 2.0 * outer)]
+        for s in (-1.0, 1.0)
+    )
+    drop = float(ahead[:, 1].mean() - behind[:, 1].mean())
+    slip = 1.0 - speed / (omega * outer) if omega else 0.0
+    return Rolling(speed, sinkage, slip, drop, track)
