@@ -81,7 +81,7 @@ def _distance(shape, at, normal):
     return total
 
 
-@njit(fastmath=FASTMATH, error_model="numpy")
+@njit(fastmath=FASTMATH, error_model="numpy", cache=True)
 def distances(shape, points):
     """Signed distances of points of the body's frame, (n, dim) [m]."""
     found, normal = np.empty(points.shape[0]), np.zeros(points.shape[1])

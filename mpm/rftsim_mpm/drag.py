@@ -51,6 +51,7 @@ class Drag:
                 depth=depth,
                 speed=speed,
                 cells=self.cells,
+                bed=2.5,
             )
             for depth in self.depths
             for speed in self.speeds

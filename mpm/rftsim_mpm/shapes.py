@@ -145,7 +145,7 @@ def extruded(shape: Shape, width: float) -> Shape:
     # Counter-clockwise with z up and x to the right is seen from -y.
     vertices = np.concatenate([np.insert(ring, 1, y, axis=1) for y in (-width / 2.0, width / 2.0)])
     sides = np.concatenate([np.column_stack([index, after + n, after]), np.column_stack([index, index + n, after + n])])
-    return mesh(vertices, np.concatenate([caps, caps[:, ::-1] + n, sides[:, ::-1]]), shape.name)
+    return mesh(vertices, np.concatenate([caps, caps[:, ::-1] + n, sides]), shape.name)
 
 
 def wheel(

@@ -25,7 +25,7 @@ def load_shape(path: Path, *, scale: float = 1.0) -> Shape:
     return mesh(np.array(body.vertices) * scale, np.array(body.faces), path.name)
 
 
-def silhouette(path: Path, *, width: float, tolerance: float = 0.6) -> Shape:
+def silhouette(path: Path, *, width: float, tolerance: float = 1.5) -> Shape:
     """The one figure in a PNG as a polygon about its centroid.
 
     Args:

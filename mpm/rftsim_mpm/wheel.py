@@ -56,6 +56,9 @@ class Wheel:
         if self.grousers < 2 or self.grousers * self.width >= 2.0 * math.pi * self.radius:
             raise MpmError(f"{self.grousers} grousers of {self.width:g} m do not fit on the wheel; 2 at least")
 
+        if self.width < 1.06 * self.dx:
+            raise MpmError(f"grousers {self.width:g} m wide are too thin for cells of {self.dx:g} m: use smaller ones")
+
     @property
     def outer(self) -> float:
         """Radius with grousers [m]."""

@@ -7,6 +7,7 @@ from rich.table import Table
 
 from rftsim_mpm.bench import throughput, together
 from rftsim_mpm.cli.report import print_json
+from rftsim_mpm.errors import MpmError
 
 
 @dataclasses.dataclass(frozen=True)
@@ -25,6 +26,8 @@ class Bench:
 
     def __call__(self) -> None:
         """Measure and print."""
+        if self.processes < 1:
+            raise MpmError(f"processes must be at least 1, not {self.processes}")
         report = {}
         table = Table("dimensions", "particles", "million particle-updates/s", title="one thread, float64")
         for dim in (2, 3):

@@ -13,11 +13,21 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 def progress(title: str, *, quiet: bool) -> Iterator[Callable[[float], None]]:
     """A bar on standard error with the time left; the block reports the share that is done, from 0 to 1."""
     columns = TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn()
-    with Progress(
+    bar = Progress(
         *columns, TextColumn("left"), TimeRemainingColumn(), console=Console(stderr=True), transient=True, disable=quiet
-    ) as bar:
-        task = bar.add_task(title, total=1.0)
-        yield lambda share: bar.update(task, completed=share)
+    )
+    task = bar.add_task(title, total=1.0)
+
+    def show(share: float) -> None:
+        if not bar.live.is_started:  # not before there is something to show: what cannot run says so on one line
+            bar.start()
+        bar.update(task, completed=share)
+
+    try:
+        yield show
+    finally:
+        if bar.live.is_started:
+            bar.stop()
 
 
 def print_json(value: Any) -> None:

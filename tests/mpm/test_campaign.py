@@ -1,0 +1,105 @@
+"""Campaigns: one result for each plate, whatever happens on the way."""
+
+import dataclasses
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from rftsim_mpm.campaign import begin, key, manifest, read_plates, results, run, status
+from rftsim_mpm.errors import MpmError
+from rftsim_mpm.plate import Plate
+
+GRID = """
+[defaults]
+cells = 4
+bed = 0.25
+depth = 0.005
+[[plates]]
+mu_int = [0.3, 0.4]
+beta = [0.0, 20.0]
+"""
+
+
+@pytest.fixture
+def file(tmp_path):
+    path = tmp_path / "grid.toml"
+    path.write_text(GRID)
+    return path
+
+
+def test_lists_are_the_axes_of_a_grid(file):
+    plates = read_plates(file)
+    assert [(plate.mu_int, plate.beta) for plate in plates] == [(0.3, 0.0), (0.3, 20.0), (0.4, 0.0), (0.4, 20.0)]
+    assert all(plate.cells == 4.0 and isinstance(plate.cells, float) for plate in plates)
+    assert len({key(plate) for plate in plates}) == 4
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [("plates = 3", "must have"), ("[[plates]]\nmu = 0.4", "no mu"), ("[[plates]]\nmu_int = 'x'", "cannot be 'x'"),
+     ("[[plates]]\ndim = 2.5", "cannot be 2.5"), ("[[plates]]\nmu_int = [0.4, -1.0]", "mu_int must be"),
+     ("[[", "not TOML")],
+)  # fmt: skip
+def test_grids_that_cannot_be(tmp_path, text, said):
+    path = tmp_path / "grid.toml"
+    path.write_text(text)
+    with pytest.raises(MpmError, match=said):
+        read_plates(path)
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_killed_and_resumed(file, tmp_path):
+    """SIGKILL in the middle, then resume: every plate once, what was finished untouched, no orphan at work."""
+    folder = tmp_path / "out"
+    command = [
+        sys.executable,
+        "-c",
+        "from rftsim_mpm.cli import main; main()",
+        "campaign",
+        "run",
+        str(file),
+        str(folder),
+    ]
+    first = subprocess.Popen([*command, "--processes", "1", "--json"], stdout=subprocess.DEVNULL)
+    until = time.monotonic() + 120.0
+    while not list((folder / "results").glob("[!.]*.json")) and time.monotonic() < until:
+        time.sleep(0.02)
+    os.kill(first.pid, signal.SIGKILL)
+    first.wait()
+    time.sleep(1.0)
+    before = {path: path.stat().st_mtime_ns for path in (folder / "results").glob("[!.]*.json")}
+    assert 1 <= len(before) < 4
+    assert run(folder, 2, lambda name: None) == []
+    assert len(status(folder).finished) == 4
+    assert {path: path.stat().st_mtime_ns for path in before} == before
+
+    damaged = sorted(before)[0]
+    damaged.write_text(damaged.read_text().replace("0", "1", 1))
+    assert status(folder).damaged == [damaged.stem]
+    again: list[str] = []
+    assert run(folder, 1, again.append) == []
+    assert again == [damaged.stem]
+    assert not status(folder).damaged
+    assert len(results(folder)) == 3
+
+
+def test_a_campaign_can_grow(file, tmp_path):
+    """Plates are added; those that are known keep their keys, so their results."""
+    begin(tmp_path / "out", read_plates(file))
+    before = {key(plate) for plate in manifest(tmp_path / "out")}
+    begin(tmp_path / "out", [dataclasses.replace(Plate(), mu_int=0.7)])
+    after = {key(plate) for plate in manifest(tmp_path / "out")}
+    assert before < after
+    assert len(after) == 5
+
+
+def test_folders_that_are_no_campaign(tmp_path):
+    with pytest.raises(MpmError, match="no campaign"):
+        status(tmp_path)
+    (tmp_path / "manifest.json").write_text(json.dumps({"plates": {"x": {"mu": 1}}}))
+    with pytest.raises(MpmError, match="damaged"):
+        status(tmp_path)
