@@ -89,15 +89,20 @@ def make_grid_step(dim: int) -> Any:
         source  # noqa: B018
         impulse[:] = 0.0
         at = np.zeros(DIM, np.int64)
+        at[DIM - 1] = -1
         found = np.ones((1 << DIM, 1 + DIM), np.int64)
         for node in range(grid.shape[0]):
             for a in range(DIM):
                 grid[node, 1 + DIM + a] += grid[node, 0] * gravity[a]
         for node in range(grid.shape[0]):
-            rest, beside = node, False
-            for a in range(DIM - 1, -1, -1):
-                at[a] = rest % shape[a]
-                rest //= shape[a]
+            axis = DIM - 1
+            at[axis] += 1
+            while at[axis] == shape[axis]:
+                at[axis] = 0
+                axis -= 1
+                at[axis] += 1
+            beside = False
+            for a in range(DIM):
                 beside = beside or at[a] <= 2 or at[a] >= shape[a] - 3
             if not beside:
                 mass = grid[node, 0]
