@@ -19,8 +19,8 @@ cells = 4
 bed = 0.25
 depth = 0.005
 [[plates]]
-mu_int = [0.3, 0.4]
-beta = [0.0, 20.0]
+mu_int = 0.4
+beta = [0.0, 20.0, 30.0]
 """
 
 
@@ -33,9 +33,9 @@ def file(tmp_path):
 
 def test_lists_are_the_axes_of_a_grid(file):
     plates = read_plates(file)
-    assert [(plate.mu_int, plate.beta) for plate in plates] == [(0.3, 0.0), (0.3, 20.0), (0.4, 0.0), (0.4, 20.0)]
+    assert [(plate.mu_int, plate.beta) for plate in plates] == [(0.4, 0.0), (0.4, 20.0), (0.4, 30.0)]
     assert all(plate.cells == 4.0 and isinstance(plate.cells, float) for plate in plates)
-    assert len({key(plate) for plate in plates}) == 4
+    assert len({key(plate) for plate in plates}) == 3
 
 
 @pytest.mark.parametrize(
@@ -55,16 +55,9 @@ def test_grids_that_cannot_be(tmp_path, text, said):
 def test_killed_and_resumed(file, tmp_path):
     """SIGKILL in the middle, then resume: every plate once, what was finished untouched, no orphan at work."""
     folder = tmp_path / "out"
-    command = [
-        sys.executable,
-        "-c",
-        "from rftsim_mpm.cli import main; main()",
-        "campaign",
-        "run",
-        str(file),
-        str(folder),
-    ]
-    first = subprocess.Popen([*command, "--processes", "1", "--json"], stdout=subprocess.DEVNULL)
+    program = [sys.executable, "-c", "from rftsim_mpm.cli import main; main()"]
+    command = [*program, "campaign", "run", str(file), str(folder), "--processes", "1", "--json"]
+    first = subprocess.Popen(command, stdout=subprocess.DEVNULL)
     until = time.monotonic() + 120.0
     while not list((folder / "results").glob("[!.]*.json")) and time.monotonic() < until:
         time.sleep(0.02)
@@ -72,9 +65,9 @@ def test_killed_and_resumed(file, tmp_path):
     first.wait()
     time.sleep(1.0)
     before = {path: path.stat().st_mtime_ns for path in (folder / "results").glob("[!.]*.json")}
-    assert 1 <= len(before) < 4
+    assert 1 <= len(before) < 3
     assert run(folder, 2, lambda name: None) == []
-    assert len(status(folder).finished) == 4
+    assert len(status(folder).finished) == 3
     assert {path: path.stat().st_mtime_ns for path in before} == before
 
     damaged = sorted(before)[0]
@@ -94,7 +87,7 @@ def test_a_campaign_can_grow(file, tmp_path):
     begin(tmp_path / "out", [dataclasses.replace(Plate(), mu_int=0.7)])
     after = {key(plate) for plate in manifest(tmp_path / "out")}
     assert before < after
-    assert len(after) == 5
+    assert len(after) == 4
 
 
 def test_folders_that_are_no_campaign(tmp_path):
