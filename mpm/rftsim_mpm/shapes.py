@@ -4,7 +4,6 @@ import dataclasses
 import math
 
 import numpy as np
-import trimesh
 from numba import njit
 from numpy.typing import NDArray
 
@@ -107,6 +106,8 @@ def mesh(vertices: Array, faces: NDArray[np.int64], name: str = "mesh") -> Shape
     Raises:
         MpmError: It is not closed.
     """
+    import trimesh  # slow to import, and the plane does not need it
+
     body = trimesh.Trimesh(vertices, faces, process=True)
     if not body.is_watertight:
         raise MpmError(f"{name} is not closed: every edge must have two faces")
@@ -122,8 +123,10 @@ def box(*size: float) -> Shape:
     half = np.array(size) / 2.0
     if len(size) == 2:
         return polygon(np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]) * half, "plate")
-    body = trimesh.creation.box(size)
-    return mesh(np.array(body.vertices), np.array(body.faces), "plate")
+    vertices = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)]) * half
+    sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    faces = np.array([triangle for a, b, c, d in sides for triangle in ((a, b, c), (a, c, d))])
+    return mesh(vertices, faces, "plate")
 
 
 def disc(radius: float, sides: int = 48) -> Shape:

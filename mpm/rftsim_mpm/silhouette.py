@@ -3,7 +3,6 @@
 from pathlib import Path
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 
 from rftsim_mpm.errors import MpmError
@@ -18,6 +17,8 @@ def load_shape(path: Path, *, scale: float = 1.0) -> Shape:
         raise MpmError(f"no file {path}")
     if path.suffix.lower() == ".png":
         return silhouette(path, width=scale)
+    import trimesh  # slow to import, and pictures do not need it
+
     try:
         body = trimesh.load_mesh(path)
     except (ValueError, NotImplementedError, KeyError, IndexError) as error:
