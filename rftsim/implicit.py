@@ -33,6 +33,8 @@ LOOSEST: Final = 20.0
 """Factor to which the tolerance is loosened, from the sixth iteration on."""
 CENTRED: Final = 3e-3
 """Effect of the force's change within a step on a body's velocity, relative, from which on it is counted."""
+NOTHING: Final = AT.nbody
+"""Instead of an entry of derivatives: none."""
 NEAR: Final = 0.25
 """Square of the share of a body's speed that is left where a step is said to pass its rest."""
 BESIDE: Final = 0.3
@@ -95,15 +97,16 @@ def evaluate(p, v, at):
 
 
 @njit
-def differentiate(p, v, completed):
-    """Evaluate the derivative of each body's wrench by its twist, the exact one or the completed one."""
+def differentiate(p, v, entry):
+    """Evaluate the derivative of each body's wrench by its twist, the exact or the completed one, into its entry."""
     twist = np.empty(6)
     sand = equation.number(p, AT.sand)
+    completed = 1.0 if entry == AT.completed else 0.0
     for b in range(equation.number(p, AT.nbody)):
         twist_of(p, b, v, twist)
         f, r = equation.body_frame(p, b).ctypes.data, equation.body_rotation(p, b).ctypes.data
-        out = equation.derivative(p, AT.completed if completed else AT.derivative, b).ctypes.data
-        jacobian(sand, equation.body_surface(p, b), f, r, twist.ctypes.data, 1.0 if completed else 0.0, out)
+        out = equation.derivative(p, entry, b).ctypes.data
+        jacobian(sand, equation.body_surface(p, b), f, r, twist.ctypes.data, completed, out)
         twist[0] = 0.0
     doubles(equation.number(p, AT.counts), 3)[1] += 1.0
 
@@ -168,15 +171,15 @@ def copy_point(p, origin, target):
 
 
 @njit
-def _linearise(p, entry, use):
-    """Fill scratch matrix 0 with M - h J' G J, G the derivatives in an entry; with M where they are not in use."""
+def _linearise(p, entry):
+    """Fill scratch matrix 0 with M - h J' G J, G the derivatives in an entry; with M for NOTHING."""
     h = doubles(equation.number(p, AT.step), 2)[0]
     a, mass = equation.scratch(p, 0), equation.square(p, AT.mass)
     nv = a.shape[0]
     for i in range(nv):
         for k in range(nv):
             a[i, k] = mass[i, k]
-    if not use:
+    if entry == NOTHING:
         return
     column = equation.vector(p, VECTOR.change)
     for b in range(equation.number(p, AT.nbody)):
@@ -208,12 +211,12 @@ def _factor_with_rows(p, x, force):
 
 
 @njit
-def linear_solution(p, v, residual, entry, use, out):
+def linear_solution(p, v, residual, entry, out):
     """Fill out with the velocity that solves the equation for the sand's force linearised at v, the rows exactly.
 
     Newton's method on the rows, each step to where the missing impulse along it vanishes: a convex problem.
     """
-    _linearise(p, entry, use)
+    _linearise(p, entry)
     lu, order = equation.scratch(p, 1), equation.order(p, AT.order)
     direction, missing = equation.vector(p, VECTOR.direction), equation.vector(p, VECTOR.missing)
     if equation.number(p, AT.nrow) == 0:
@@ -400,7 +403,7 @@ def centre(p):
     scores = equation.point_scores(p, at)
     if is_small and scores[0] < 1e-4 * scores[1]:
         return
-    linear_solution(p, v, residual, AT.derivative, known, end)
+    linear_solution(p, v, residual, AT.derivative if known else NOTHING, end)
     if is_small:
         return
     h = doubles(equation.number(p, AT.step), 2)[0]
@@ -456,7 +459,7 @@ def solve(p):
     new_residual = equation.point_vector(p, equation.point(p, POINT.new), PART.residual)
     direction = equation.vector(p, VECTOR.mean)
     residual_of(p, last, equation.of_dofs(p, AT.foreseen), residual)
-    linear_solution(p, last, residual, AT.derivative, known, v)
+    linear_solution(p, last, residual, AT.derivative if known else NOTHING, v)
     attempt(p, POINT.now)
     stale = fresh = by_secant = False
     if now[2] > 1.0 and now[0] > 0.3 * now[1]:  # a poor guess: is the last velocity nearer?
@@ -477,12 +480,12 @@ def solve(p):
         if shortened == 0:
             by_secant = secant > 0
             if by_secant:
-                differentiate(p, v, True)
+                differentiate(p, v, AT.completed)
                 secant -= 1
             elif not fresh and (stale or not known):
-                differentiate(p, v, False)
+                differentiate(p, v, AT.derivative)
                 known, fresh, stale = True, True, False
-            linear_solution(p, v, residual, AT.completed if by_secant else AT.derivative, True, direction)
+            linear_solution(p, v, residual, AT.completed if by_secant else AT.derivative, direction)
             for k in range(v.size):
                 direction[k] -= v[k]
             t = 1.0

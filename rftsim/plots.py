@@ -92,8 +92,8 @@ def plot_stability(rows: list[Row], path: Path) -> None:
     right.set_xlabel("elapsed time per simulated second [s]")
     for axis in (left, right):
         axis.axhline(LOST, color="0.6", linestyle=":")
-        axis.grid(alpha=0.3, which="both")
-        axis.legend()
+        axis.grid(alpha=0.3)
+        axis.legend(loc="lower right")
     left.text(steps[0] * 1e3, LOST, "lost", color="0.4", va="bottom")
     figure.suptitle(f"{len(rows)} hard cases, and their median (bold)")
     figure.savefig(path, dpi=110)

@@ -72,7 +72,7 @@ def forces(p, x, out):
     """Fill out with each row's force at J a - aref = x, (nrow,)."""
     kind = int64s(equation.number(p, AT.row_kind), equation.number(p, AT.nrow))
     stiffness, bound = equation.of_rows(p, AT.row_stiffness), equation.of_rows(p, AT.row_bound)
-    i = 0
+    i = np.int64(0)  # no constant, for which numba would compile what takes it anew
     while i < kind.size:
         if kind[i] == KIND.cone:
             last = last_of_cone(kind, i)
@@ -105,7 +105,7 @@ def add_stiffness(p, x, force, a):
         equation.rows_by_dofs(p, AT.row_jacobian),
         equation.rows_by_dofs(p, AT.row_acceleration),
     )
-    i = 0
+    i = np.int64(0)  # no constant, for which numba would compile what takes it anew
     while i < kind.size:
         if kind[i] != KIND.cone:
             active = stiffness[i]

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from rftsim.errors import RftsimError
-from rftsim.readout import wrenches
+from rftsim.readout import work, wrenches
 from rftsim.scenes import Staged
 from rftsim.surface import Array
 from rftsim.validity import Validity, validity
@@ -115,8 +115,15 @@ def steps(staged: Staged) -> Generator[mujoco.MjData, None, Run]:
         yield data
     columns = [np.array(column) for column in zip(*rows, strict=True)]
     history = History(*columns)
-    doubts = tuple(dict.fromkeys(_worst(checks)))
-    return Run(history, _steady(history, measured.wheel_radius), staged.duration / elapsed, doubts, data)
+    doubts = _worst(checks)
+    spent = work(model, data)
+    if spent.unsolved:
+        doubts.append(
+            f"{spent.unsolved} equations of the implicit force in {spent.steps} steps were not solved to their "
+            f"tolerance: compare with a shorter timestep than {model.opt.timestep:g} s"
+        )
+    steady = _steady(history, measured.wheel_radius)
+    return Run(history, steady, staged.duration / elapsed, tuple(dict.fromkeys(doubts)), data)
 
 
 def _row(

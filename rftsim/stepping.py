@@ -23,7 +23,8 @@ FINENESS: Final = 5e-3
 """Error of the position in a step, over the depth, above which the step is split."""
 SHALLOWEST: Final = 1e-4
 """Depth [m] below which none is resolved."""
-MOST_PARTS: Final = 256
+MOST_PARTS: Final = (256, 1)
+"""Parts of a step; where those did work, it is taken whole."""
 GAIN: Final = 1e-7
 """Work that the sand may do in a step over the kinetic energy: rounding, not physics, and more is taken back."""
 FALL: Final = 30.0
@@ -159,7 +160,7 @@ def _parts(p, first_step, solved):
         worst = max(worst, error / allowed)
         if first_step and travel > allowed:
             worst = max(worst, 3.9)
-    parts = 1 if worst <= 1.0 else min(int(np.ceil(np.sqrt(worst))), MOST_PARTS)
+    parts = 1 if worst <= 1.0 else min(int(np.ceil(np.sqrt(worst))), MOST_PARTS[0])
     return parts if solved else max(parts, 4)
 
 
@@ -211,7 +212,7 @@ def _answer(p, q, out):
     v, residual = equation.of_dofs(p, AT.velocity), equation.step_vector(p, KEEP.four)
     dense.factor_of(equation.square(p, AT.mass), equation.square(p, AT.mass_factors), equation.order(p, AT.mass_order))
     implicit.residual_of(p, v, q, residual)
-    implicit.linear_solution(p, v, residual, AT.derivative, False, out)
+    implicit.linear_solution(p, v, residual, implicit.NOTHING, out)
 
 
 @njit
@@ -224,7 +225,7 @@ def _finish(p, foreseen, last, delta, after, split):
         part_of(new, 2, nv)[k] = delta[k] - after[k]
     dense.copy(after, part_of(new, 3, nv))
     dense.copy(doubles(equation.number(p, AT.derivative), 36 * nb), new[HEAD + 4 * nv :])
-    new[KNOWS_FORCE], new[SPLIT] = 1.0, 1.0 if split else 0.0
+    new[KNOWS_FORCE], new[SPLIT] = 1.0, split
     new[KNOWS_DERIVATIVE] = doubles(equation.number(p, AT.flags), 1)[0]
 
 
@@ -242,8 +243,8 @@ def step(p):
     dense.copy(frames, first)
     dense.multiply(equation.square(p, AT.plain_mass), v, moved)
     allowed = GAIN * dense.dot(v, moved) + 1e-12
-    work, slack, most_parts = 0.0, 0.0, MOST_PARTS
-    for _ in range(2):
+    work, slack = 0.0, 0.0
+    for most_parts in MOST_PARTS:
         _begin(new)
         _one_step(p, most_parts)
         work, slack = 0.0, allowed
@@ -256,7 +257,7 @@ def step(p):
         # a split step whose mean force does work: take it whole, from MuJoCo's own velocity
         for i in range(before.size):
             before[i] = 0.0
-        before[STARTED], most_parts = 1.0, 1
+        before[STARTED] = 1.0
         dense.copy(first, frames)
     if work > slack:
         # the force's own share of the work, and the rest's: scale it until they cancel
@@ -300,7 +301,7 @@ def _one_step(p, most_parts):
         doubles(equation.number(p, AT.counts), 3)[2] += 1.0
     at, foreseen, end = equation.point(p, POINT.best), equation.step_vector(p, KEEP.six), equation.of_dofs(p, AT.end)
     implicit.generalised(p, at, 1, foreseen)
-    _finish(p, foreseen, equation.point_vector(p, at, PART.velocity), end, end, False)
+    _finish(p, foreseen, equation.point_vector(p, at, PART.velocity), end, end, 0.0)
     for b in range(nb):
         dense.copy(equation.point_wrench(p, at, b, 0), doubles(equation.number(p, AT.wrench) + 48 * b, 6))
     _force_of(p, end, equation.of_dofs(p, AT.out))
@@ -407,5 +408,5 @@ def _split_step(p, parts):
     _force_of(p, answer, q)
     if has_contacts:
         _answer(p, q, answer)
-    _finish(p, foreseen, equation.point_vector(p, at, PART.velocity), true, answer, True)
+    _finish(p, foreseen, equation.point_vector(p, at, PART.velocity), true, answer, 1.0)
     new[DRIFT] = drift

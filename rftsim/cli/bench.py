@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
-from rftsim.bench.hard_cases import CASES
+from rftsim.bench.hard_cases import CASES, Force
 from rftsim.bench.stability import FORCES, STEPS, Row, Starts, Study, Summary, run, summarise
 from rftsim.cli.output import check_writable, print_json, replacing
 from rftsim.errors import RftsimError
@@ -66,7 +66,7 @@ class Bench:
             print_json(_report(rows, summary, starts))
             return
         console = Console()
-        for table in (_errors(rows), _costs(rows)):
+        for table in _tables(rows):
             console.print(table)
         _print_summary(console, summary, len(rows), starts)
         if picture is not None:
@@ -94,41 +94,34 @@ def _percent(value: float) -> str:
     return f"{100 * value:.2f}" if value < 0.0995 else f"{100 * value:.0f}"
 
 
-def _steps(rows: list[Row]) -> list[float]:
-    return sorted({h for row in rows for _, h in row.played})
+def _tables(rows: list[Row]) -> list[Table]:
+    steps = sorted({h for row in rows for _, h in row.played})
 
+    def table(title: str, cell: Callable[[Row, float], str]) -> Table:
+        found = Table(title=title, title_justify="left")
+        found.add_column("case", no_wrap=True)
+        for h in steps:
+            found.add_column(f"{1e3 * h:g} ms", justify="right", no_wrap=True)
+        for row in rows:
+            found.add_row(row.case, *(cell(row, h) for h in steps))
+        return found
 
-def _errors(rows: list[Row]) -> Table:
-    table = Table(title="error [%] against the exact or converged answer, by time step [ms]")
-    table.add_column("case")
-    for force in FORCES:
-        for h in _steps(rows):
-            table.add_column(f"{force}\n{1e3 * h:g}", justify="right")
-    for row in rows:
-        table.add_row(row.case, *(_percent(row.verdicts[force, h].error) for force in FORCES for h in _steps(rows)))
-    return table
+    def rest(row: Row, h: float) -> str:
+        value = row.verdicts["implicit", h].rest
+        return "-" if math.isnan(value) else f"{value:.2g}"
 
+    def work(row: Row, h: float) -> str:
+        played = row.played["implicit", h]
+        return f"{played.evaluations:.2f} + {played.jacobians:.2f}"
 
-def _costs(rows: list[Row]) -> Table:
-    table = Table(
-        title="implicit force: what ought to rest over its limit; evaluations + derivatives per step; unsolved"
-    )
-    table.add_column("case")
-    for h in _steps(rows):
-        table.add_column(f"rest\n{1e3 * h:g}", justify="right")
-    for h in _steps(rows):
-        table.add_column(f"work\n{1e3 * h:g}", justify="right")
-    table.add_column("unsolved", justify="right")
-    for row in rows:
-        rests = [row.verdicts["implicit", h].rest for h in _steps(rows)]
-        played = [row.played["implicit", h] for h in _steps(rows)]
-        table.add_row(
-            row.case,
-            *("-" if math.isnan(rest) else f"{rest:.2g}" for rest in rests),
-            *(f"{one.evaluations:.2f}+{one.jacobians:.2f}" for one in played),
-            str(sum(one.unsolved for one in played)),
-        )
-    return table
+    def error(force: Force) -> Callable[[Row, float], str]:
+        return lambda row, h: _percent(row.verdicts[force, h].error)
+
+    return [
+        *(table(f"error [%] of the {force} force", error(force)) for force in FORCES),
+        table("implicit force: what ought to be zero, over its limit", rest),
+        table("implicit force: evaluations + derivatives per step", work),
+    ]
 
 
 def _print_summary(console: Console, summary: Summary, cases: int, starts: Starts) -> None:

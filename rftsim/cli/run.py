@@ -5,6 +5,7 @@ import dataclasses
 import math
 from collections.abc import Callable
 from pathlib import Path
+from typing import Literal
 
 import mujoco
 import tyro
@@ -34,6 +35,8 @@ class Run:
     """Instead of the scene's sand: a preset, key=value,... or a TOML file."""
     set: Settings = ()
     """Settings of a shipped scene, key=value ...; may be repeated."""
+    force: Literal["implicit", "explicit"] = "implicit"
+    """The sand's force: at the end of each step, or at the velocity of the moment, which needs short steps."""
     duration: float | None = None
     """Simulated time [s]."""
     timestep: float | None = None
@@ -66,6 +69,7 @@ class Run:
             settings=settings(self.set),
             timestep=self.timestep,
             duration=self.duration,
+            force=self.force,
             disable_floor=self.disable_floor,
             allow_open=self.allow_open,
         )

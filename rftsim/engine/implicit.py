@@ -207,7 +207,7 @@ def press(model, data, contact, m, d, number):
     rows = int32s(d + data.nefc, 1)[0]
     entries = np.empty(equation.ENTRIES, np.int64)
     p = entries.ctypes.data
-    memory = np.empty(equation.lay_out(p, 0, nbody, nv, rows, old.size) // 8)
+    memory = np.empty(equation.lay_out(p, 0 * nbody, nbody, nv, rows, old.size) // 8)
     equation.lay_out(p, memory.ctypes.data, nbody, nv, rows, old.size)
     entries[AT.old], entries[AT.new] = old.ctypes.data, new.ctypes.data
     entries[AT.counts] = counted.ctypes.data
