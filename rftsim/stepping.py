@@ -260,16 +260,33 @@ def step(p):
         before[STARTED] = 1.0
         dense.copy(first, frames)
     if work > slack:
-        # the force's own share of the work, and the rest's: scale it until they cancel
-        dense.substitute(equation.square(p, AT.mass_factors), equation.order(p, AT.mass_order), q, moved)
-        own = 0.5 * h * dense.dot(q, moved)
-        rest = work / h - own
-        share = 0.0 if rest >= 0.0 else min(1.0, -rest / own)
-        for k in range(nv):
+        _take_back(p, work, slack)
+
+
+@njit
+def _take_back(p, work, slack):
+    """Shrink a force that did work until it does none, and the wrenches with it."""
+    nb, h, v = equation.number(p, AT.nbody), _timestep(p), equation.of_dofs(p, AT.velocity)
+    q, moved, answer = equation.of_dofs(p, AT.out), equation.step_vector(p, KEEP.one), equation.of_dofs(p, AT.end)
+    wrench = doubles(equation.number(p, AT.wrench), 6 * nb)
+    # the force's own share of the work, and the rest's: where there are no constraints, they cancel at once
+    dense.substitute(equation.square(p, AT.mass_factors), equation.order(p, AT.mass_order), q, moved)
+    own = 0.5 * h * dense.dot(q, moved)
+    rest = work / h - own
+    share = 0.0 if rest >= 0.0 else min(1.0, -rest / own)
+    for trial in range(6):
+        for k in range(q.size):
             q[k] *= share
-        wrench = doubles(equation.number(p, AT.wrench), 6 * nb)
-        for k in range(6 * nb):
+        for k in range(wrench.size):
             wrench[k] *= share
+        _answer(p, q, answer)
+        work = 0.0
+        for k in range(q.size):
+            work += 0.5 * h * q[k] * (v[k] + answer[k])
+        if work <= slack:
+            break
+        share = 0.5 if trial < 4 else 0.0
+    dense.copy(answer, part_of(_state(p, AT.new), 3, v.size))
 
 
 @njit
