@@ -111,8 +111,7 @@ def _tables(rows: list[Row]) -> list[Table]:
         return "-" if math.isnan(value) else f"{value:.2g}"
 
     def work(row: Row, h: float) -> str:
-        played = row.played["implicit", h]
-        return f"{played.evaluations:.2f} + {played.jacobians:.2f}"
+        return f"{row.played['implicit', h].evaluations:.2f}"
 
     def error(force: Force) -> Callable[[Row, float], str]:
         return lambda row, h: _percent(row.verdicts[force, h].error)
@@ -120,7 +119,7 @@ def _tables(rows: list[Row]) -> list[Table]:
     return [
         *(table(f"error [%] of the {force} force", error(force)) for force in FORCES),
         table("implicit force: what ought to be zero, over its limit", rest),
-        table("implicit force: evaluations + derivatives per step", work),
+        table("implicit force: evaluations per step", work),
     ]
 
 
