@@ -19,11 +19,11 @@ from typing import Final
 import numpy as np
 from numba import njit
 
-from rftsim import dense, equation, packed, rows
+from rftsim import dense, equation, rows
 from rftsim.equation import AT, PART, POINT, ROW, VECTOR
-from rftsim.kernels import TINY, Frame
+from rftsim.kernels import TINY
 from rftsim.memory import doubles
-from rftsim.native_ahead import V_C, ahead, jacobian
+from rftsim.native_ahead import V_C, ahead, jacobian, moving_frame
 
 TOLERANCE: Final = 3e-3
 """Allowed error of a sand body's velocity, relative; V_C is added."""
@@ -48,8 +48,8 @@ def twist_of(p, b, v, out):
 
 
 @njit
-def speed_of(p, b, v):
-    """|velocity| + length |angular velocity| of body b at a generalised velocity [m/s]."""
+def speed_of(p, b, v, lengths=1.0):
+    """|velocity| + |angular velocity| times so many lengths of body b, at a generalised velocity [m/s]."""
     j, length = equation.body_jacobian(p, b), equation.body_length(p, b)
     square, total = 0.0, 0.0
     for r in range(6):
@@ -59,17 +59,13 @@ def speed_of(p, b, v):
         square += y * y
         if r == 2:
             total, square = np.sqrt(square), 0.0
-    return total + length * np.sqrt(square)
+    return total + lengths * length * np.sqrt(square)
 
 
 @njit
 def frame_at(p, b, twist):
     """The frame of body b that moves with a twist."""
-    f, xmat = equation.body_frame(p, b), equation.body_rotation(p, b)
-    v0 = packed.to_body(xmat, twist[0], twist[1], twist[2])
-    omega = packed.to_body(xmat, twist[3], twist[4], twist[5])
-    up, rise, forward = (f[0], f[1], f[2]), (f[3], f[4], f[5]), (f[6], f[7], f[8])
-    return Frame(v0, omega, up, rise, forward, f[9], (f[10], f[11], f[12], f[13]), f[14])
+    return moving_frame(equation.body_frame(p, b), equation.body_rotation(p, b), twist)
 
 
 @njit
@@ -448,7 +444,6 @@ def solve(p):
     """Solve the equation: fill AT.end and AT.flags, leave the velocity and its wrenches in point POINT.best."""
     flags = doubles(equation.number(p, AT.flags), 2)
     known = flags[0] > 0.0
-    dense.factor_of(equation.square(p, AT.mass), equation.square(p, AT.mass_factors), equation.order(p, AT.mass_order))
     step, last = doubles(equation.number(p, AT.step), 2), equation.of_dofs(p, AT.last)
     step[1] = step[0] * size(p, equation.of_dofs(p, AT.force))
     now = equation.point_scores(p, equation.point(p, POINT.now))

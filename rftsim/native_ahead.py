@@ -30,7 +30,7 @@ frame, ahead, jacobian = (types.ExternalFunction(name, signature) for name, sign
 
 
 @njit(forceinline=True)
-def _moving_frame(f, xmat, twist):
+def moving_frame(f, xmat, twist):
     """The frame of a body that moves with a twist, velocity first, world axes."""
     v0 = packed.to_body(xmat, twist[0], twist[1], twist[2])
     omega = packed.to_body(xmat, twist[3], twist[4], twist[5])
@@ -74,7 +74,7 @@ def _make(source: str) -> dict[str, Any]:
     def rftsim_ahead(sand, surface, frame, xmat, twist, h, out):
         """Wrench continuous at rest, world frame: at the present depths, and at those after a time h, (12,)."""
         s, body, r = doubles(sand, packed.SAND_SIZE), surface_at(surface), doubles(xmat, 9)
-        f, medium = _moving_frame(doubles(frame, FRAME), r, doubles(twist, 6)), _soft_medium(s, body)
+        f, medium = moving_frame(doubles(frame, FRAME), r, doubles(twist, 6)), _soft_medium(s, body)
         cx, cy, cz, nx, ny, nz, area = packed.columns(body)
         total, reach = doubles(out, 12), _reach(body, f, h)
         for k in range(12):
@@ -98,7 +98,7 @@ def _make(source: str) -> dict[str, Any]:
     def rftsim_jacobian(sand, surface, frame, xmat, twist, completed, out):
         """Derivative of `rftsim_ahead`'s present wrench by the twist, world frame, (6, 6)."""
         s, body, r = doubles(sand, packed.SAND_SIZE), surface_at(surface), doubles(xmat, 9)
-        f, medium = _moving_frame(doubles(frame, FRAME), r, doubles(twist, 6)), _soft_medium(s, body)
+        f, medium = moving_frame(doubles(frame, FRAME), r, doubles(twist, 6)), _soft_medium(s, body)
         count = int(body[14]) if source else 0
         scratch, local, turned = np.empty(kernels.SCRATCH), np.zeros((6, 6)), np.empty((6, 6))
         for first in range(0, count, kernels.BLOCK):

@@ -9,9 +9,8 @@ from numba import njit
 
 from rftsim import dense, equation
 from rftsim.equation import AT, KIND
+from rftsim.kernels import TINY
 from rftsim.memory import doubles, int64s
-
-_TINY = 1e-300
 
 
 @njit
@@ -125,11 +124,11 @@ def add_stiffness(p, x, force, a):
         elif zone == 2:
             mu = bound[i]
             d = stiffness[i] / (mu * mu * (1.0 + mu * mu))
-            turn = mu * (normal - mu * tangential) / (tangential + _TINY)  # of the friction's direction; negative
+            turn = mu * (normal - mu * tangential) / (tangential + TINY)  # of the friction's direction; negative
             for r in range(i, last):
-                ur = x[r] * bound[r] / (tangential + _TINY)
+                ur = x[r] * bound[r] / (tangential + TINY)
                 for k in range(i, last):
-                    uk = x[k] * bound[k] / (tangential + _TINY)
+                    uk = x[k] * bound[k] / (tangential + TINY)
                     if r == i and k == i:
                         share = d
                     elif r == i:

@@ -42,16 +42,6 @@ def _timestep(p):
 
 
 @njit
-def _speed_in(p, b, v, share):
-    """Speed of body b, angular velocity counted with `share` times its length."""
-    twist = np.empty(6)
-    implicit.twist_of(p, b, v, twist)
-    linear = np.sqrt(twist[0] * twist[0] + twist[1] * twist[1] + twist[2] * twist[2])
-    angular = np.sqrt(twist[3] * twist[3] + twist[4] * twist[4] + twist[5] * twist[5])
-    return linear + share * equation.body_length(p, b) * angular
-
-
-@njit
 def is_near(p):
     """Whether any triangle can be in the sand within the step."""
     v, h, twist = equation.of_dofs(p, AT.velocity), _timestep(p), np.zeros(6)
@@ -61,7 +51,7 @@ def is_near(p):
         depth = frame.height
         for k in range(3):
             depth -= min(frame.rise[k] * surface[1 + k], frame.rise[k] * surface[4 + k])
-        if depth + h * (_speed_in(p, b, v, 2.0) + h * FALL) > 0.0:
+        if depth + h * (implicit.speed_of(p, b, v, 2.0) + h * FALL) > 0.0:
             return True
     return False
 
@@ -166,11 +156,12 @@ def _parts(p, first_step, solved):
 
 @njit
 def _prepare(p, h):
-    """Set the equation's mass, rows and step for a time h."""
+    """Set the equation's mass and its factors, its rows and its step for a time h."""
     drag, plain, mass = equation.square(p, AT.drag), equation.square(p, AT.plain_mass), equation.square(p, AT.mass)
     for i in range(mass.shape[0]):
         for k in range(mass.shape[0]):
             mass[i, k] = plain[i, k] + h * drag[i, k]
+    dense.factor_of(mass, equation.square(p, AT.mass_factors), equation.order(p, AT.mass_order))
     j, dragged = equation.rows_by_dofs(p, AT.row_jacobian), equation.rows_by_dofs(p, AT.row_drag)
     seen = equation.rows_by_dofs(p, AT.row_acceleration)
     for i in range(j.shape[0]):
@@ -188,7 +179,6 @@ def _force_of(p, velocity, out):
     residual, nothing = equation.step_vector(p, KEEP.four), equation.step_vector(p, KEEP.five)
     for k in range(v.size):
         nothing[k] = 0.0
-    dense.factor_of(equation.square(p, AT.mass), equation.square(p, AT.mass_factors), equation.order(p, AT.mass_order))
     implicit.residual_of(p, velocity, nothing, residual)
     for k in range(v.size):
         out[k] = residual[k] / h
@@ -202,15 +192,14 @@ def _reset(p):
     dense.copy(equation.of_dofs(p, AT.smooth_force), equation.of_dofs(p, AT.force))
     dense.copy(doubles(equation.number(p, AT.first_stiffness), n), doubles(equation.number(p, AT.row_stiffness), n))
     dense.copy(doubles(equation.number(p, AT.first_reference), n), doubles(equation.number(p, AT.row_reference), n))
-    _prepare(p, _timestep(p))
 
 
 @njit
 def _answer(p, q, out):
     """Fill out with the velocity in which MuJoCo's step ends under a generalised force of the sand."""
     _reset(p)
+    _prepare(p, _timestep(p))
     v, residual = equation.of_dofs(p, AT.velocity), equation.step_vector(p, KEEP.four)
-    dense.factor_of(equation.square(p, AT.mass), equation.square(p, AT.mass_factors), equation.order(p, AT.mass_order))
     implicit.residual_of(p, v, q, residual)
     implicit.linear_solution(p, v, residual, implicit.NOTHING, out)
 

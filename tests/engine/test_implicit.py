@@ -176,3 +176,9 @@ def test_a_thousand_random_starts():
     starts = stability.random_starts(1000)
     assert starts.failed == 0
     assert starts.gain < 1e-9
+
+
+@pytest.mark.slow
+def test_capacity_of_the_legs():
+    """What the cases of the held and the broken legs take for their capacity is measured."""
+    assert hard_cases.capacity_of_legs() == pytest.approx(hard_cases.CAPACITY, rel=0.01)
