@@ -86,7 +86,6 @@ def _fill_drag(model, data, m, d, p):
 @njit
 def _fill_force(model, data, m, d, t, p):
     """All smooth forces of this step but the sand's."""
-    external.fwd_actuation(m, d)
     bias = pointer(d + data.qfrc_bias)
     external.rne(m, d, 0, bias)
     out = equation.of_dofs(p, AT.smooth_force)
@@ -216,6 +215,7 @@ def press(model, data, contact, m, d, number):
     t = bodies.tree(model, data, m, d)
     _fill_bodies(model, m, t, table, p)
     if native_step.is_needed(p) != 0:
+        external.fwd_actuation(m, d)  # before the drag, which leaves out actuators at their limits
         _fill_mass(model, data, m, d, p)
         dragged = _fill_drag(model, data, m, d, p)
         _fill_force(model, data, m, d, t, p)

@@ -110,6 +110,18 @@ def test_every_integrator_answers_as_foreseen(integrator):
     assert foreseen(trial, 60) < 1e-5
 
 
+def test_limited_actuators_answer_as_foreseen():
+    """Servos that reach their limits and leave them again: MuJoCo damps only those that are within."""
+    trial, rng = hard_cases.legs(5e-3, "implicit"), np.random.default_rng(0)
+    trial.model.opt.tolerance, trial.model.opt.iterations = 1e-14, 200
+    trial.model.actuator_forcelimited[:], trial.model.actuator_forcerange[:] = 1, (-2.0, 2.0)
+
+    def move(data):
+        data.ctrl[:] = rng.normal(size=trial.model.nu) * 0.3
+
+    assert foreseen(trial, 60, move) < 1e-5
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_random_starts_gain_no_energy(seed):
     """MuJoCo's step does on the sand what was foreseen: no work by it, split steps and contacts included."""
