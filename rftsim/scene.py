@@ -119,7 +119,8 @@ def add_sand(
         body.name = body_name
     for geom, depth in floors.items():
         if disable_floor:
-            element = spec.geoms[int(geom.rpartition(_TEMPORARY)[2])]
+            place = geom.removeprefix(_TEMPORARY)
+            element = spec.geom(geom) if place == geom else spec.geoms[int(place)]
             element.contype = element.conaffinity = 0
         else:
             notes.append(
@@ -174,20 +175,19 @@ _TEMPORARY = "rftsim-geom:"
 
 
 def _name_elements(draft: mujoco.MjSpec) -> list[str]:
-    """Name the bodies that have no name, and mark each geom with its place in the spec; the bodies' names."""
+    """Name the bodies that have no name, and geoms that have none after their place in the spec; the bodies' names."""
     taken = {body.name for body in draft.bodies}
     for number, body in enumerate(draft.bodies):
         if not body.name:
             body.name = next(n for k in range(len(taken) + 1) if (n := f"body{number + k}") not in taken)
             taken.add(body.name)
     for number, geom in enumerate(draft.geoms):
-        geom.name = f"{geom.name}{_TEMPORARY}{number}"
+        geom.name = geom.name or f"{_TEMPORARY}{number}"
     return [body.name for body in draft.bodies]
 
 
 def _shown(geom: str) -> str:
-    name, _, number = geom.rpartition(_TEMPORARY)
-    return f"geom {name or number}"
+    return f"geom {geom.removeprefix(_TEMPORARY)}"
 
 
 def _check_names(spec: mujoco.MjSpec, name: str, surfaces: Mapping[str, Surface], sensors: bool, draw: bool) -> None:

@@ -1,0 +1,103 @@
+"""One environment, for Gymnasium."""
+
+from typing import Any, Literal
+
+import gymnasium as gym
+import mujoco
+import numpy as np
+from gymnasium.utils import EzPickle
+from numpy.typing import ArrayLike, NDArray
+from rftsim_envs import ground, tasks
+from rftsim_envs.episodes import Episodes, Observation
+from rftsim_envs.physics import One
+from rftsim_envs.task import make_config
+
+Action = NDArray[np.float32]
+
+
+class SandEnv(gym.Env[Observation, Action], EzPickle):
+    """A task in one simulation.
+
+    Episodes begin anew only at `reset`. Where MuJoCo gives a simulation up, the episode is terminated with
+    `info["diverged"]` and no reward. Actions outside -1 and 1 are clipped; those that are not finite are refused.
+
+    Args:
+        task: One of `rftsim_envs.TASKS`.
+        render_mode: `rgb_array`, or None.
+        width: Of pictures [pixels].
+        height: Of pictures [pixels].
+        **settings: Fields of the task's Config.
+
+    Raises:
+        ConfigError: No such task or setting.
+    """
+
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 50}  # noqa: RUF012, as Gymnasium has it
+
+    def __init__(
+        self,
+        task: str,
+        render_mode: Literal["rgb_array"] | None = None,
+        width: int = 640,
+        height: int = 480,
+        **settings: Any,
+    ) -> None:
+        EzPickle.__init__(self, task, render_mode, width, height, **settings)
+        if render_mode not in (None, "rgb_array"):
+            raise ValueError(f"render_mode must be 'rgb_array' or None, not {render_mode!r}")
+        self.task = tasks.make(task, settings)
+        self.config, self.render_mode = self.task.config, render_mode
+        self.physics = One(ground.lay(self.task))
+        self.model, self.data = self.physics.model, self.physics.data
+        self.episodes = Episodes(self.task, self.physics)
+        self.metadata = self.metadata | {"render_fps": round(1.0 / self.config.period)}
+        self.observation_space, self.action_space = spaces(self.episodes)
+        self._size, self._renderer = (width, height), None
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Begin an episode."""
+        super().reset(seed=seed)
+        self.episodes.restart([0], [self.np_random])
+        return self.episodes.observation()[0], _alone(self.episodes.info())
+
+    def step(self, action: ArrayLike) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """Go on by one control step."""
+        out = self.episodes.step(np.asarray(action)[None])
+        return (
+            out.observation[0],
+            float(out.reward[0]),
+            bool(out.terminated[0]),
+            bool(out.truncated[0]),
+            _alone(out.info),
+        )
+
+    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
+        """A picture, (height, width, 3)."""
+        if self.render_mode is None:
+            return None
+        if self._renderer is None:
+            width, height = self._size
+            self._renderer = mujoco.Renderer(self.model, height, width)
+        self._renderer.update_scene(self.data, camera="follow")
+        picture: NDArray[np.uint8] = self._renderer.render()
+        return picture
+
+    def close(self) -> None:
+        """Let go of what pictures need."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
+
+
+def spaces(episodes: Episodes) -> tuple[gym.spaces.Box, gym.spaces.Box]:
+    """Observations and actions of one simulation."""
+    return (
+        gym.spaces.Box(-np.inf, np.inf, (episodes.nobservation,), np.float32),
+        gym.spaces.Box(-1.0, 1.0, (episodes.task.naction,), np.float32),
+    )
+
+
+def _alone(info: dict[str, NDArray[np.generic]]) -> dict[str, Any]:
+    return {name: values[0].item() for name, values in info.items()}

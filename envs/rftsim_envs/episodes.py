@@ -1,0 +1,132 @@
+"""Episodes of a task in n simulations side by side: what single, vector and training environments are made of."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from rftsim_envs.ground import NUMBERS, Ground, draw
+from rftsim_envs.physics import Array, Flags, Physics
+from rftsim_envs.limits import Limits
+from rftsim_envs.task import Moment, Task
+
+Observation = NDArray[np.float32]
+
+
+class Outcome(NamedTuple):
+    """What a control step of n simulations gave."""
+
+    observation: Observation
+    """(n, nobservation)."""
+    reward: Array
+    """(n,)."""
+    terminated: Flags
+    """(n,)."""
+    truncated: Flags
+    """(n,)."""
+    info: dict[str, NDArray[np.generic]]
+    """(n,) each."""
+
+
+class Episodes:
+    """Episodes of a task.
+
+    Args:
+        task: What is asked; its robot is in the physics' model.
+        physics: The simulations.
+
+    Attributes:
+        nobservation: Numbers in an observation.
+    """
+
+    def __init__(self, task: Task, physics: Physics) -> None:
+        task.prepare(physics.model)
+        self.task, self.physics, n = task, physics, physics.n
+        self.ground, self._limits = Ground(physics, task.config), Limits(physics)
+        self._qpos, self._qvel = physics.field("qpos"), physics.field("qvel")
+        self._ctrl, self._sensors = physics.field("ctrl"), physics.field("sensordata")
+        self._force, self._rate = physics.field("actuator_force"), physics.field("actuator_velocity")
+        self._weight = float(physics.model.body_mass.sum() * np.linalg.norm(physics.model.opt.gravity))
+        self._command, self._action = np.zeros((n, task.ncommand)), np.zeros((n, task.naction))
+        self._count, self._energy, self._distance = np.zeros(n, dtype=int), np.zeros(n), np.zeros(n)
+        self._last = self._action.copy()
+        self.nobservation = self._observe(self._moment(self._qpos.copy(), np.zeros(n))).shape[1]
+
+    def restart(self, chosen: Sequence[int], rngs: Sequence[np.random.Generator]) -> None:
+        """Begin episodes in the chosen simulations, each with a generator of its own."""
+        model = self.physics.model
+
+        def place() -> None:
+            for i, rng in zip(chosen, rngs, strict=True):
+                self.ground.put(i, draw(self.task.config, self.task.planar, rng))
+                self._qpos[i], self._qvel[i] = model.key_qpos[0], model.key_qvel[0]
+                self._ctrl[i] = model.key_ctrl[0]
+                self._command[i] = self.task.start(rng, self._qpos[i], self._qvel[i])
+
+        self.physics.restart(chosen, place)
+        for kept in (self._count, self._energy, self._distance, self._action, self._last):
+            kept[list(chosen)] = 0
+
+    def observation(self) -> Observation:
+        """What policies see now, (n, nobservation)."""
+        return self._observe(self._moment(self._qpos, np.zeros(self.physics.n)))
+
+    def info(self) -> dict[str, NDArray[np.generic]]:
+        """What is known at the start of an episode, (n,) each."""
+        strength, friction = np.exp(self.ground.draws[:, :2]).T
+        slope = np.rad2deg(np.arcsin(np.linalg.norm(self.ground.draws[:, 2:], axis=1)))
+        return {"strength": strength, "friction": friction, "slope_deg": slope}
+
+    def step(self, action: ArrayLike) -> Outcome:
+        """A control step of every simulation.
+
+        Args:
+            action: (n, naction); clipped to -1 and 1.
+
+        Raises:
+            ValueError: It has another shape, or is not finite.
+        """
+        wanted = np.array(action, dtype=float)
+        if wanted.shape != self._action.shape or not np.isfinite(wanted).all():
+            raise ValueError(f"the action must be finite and of shape {self._action.shape}, not {action}")
+        task, period = self.task, self.task.config.period
+        before, power = self._qpos.copy(), np.zeros(self.physics.n)
+        self._last, self._action = self._action, np.clip(wanted, -1.0, 1.0)
+        self._ctrl[:] = task.controls(self._action, self._moment(before, power))
+        for _ in range(task.config.substeps):
+            self.physics.step()
+            power += np.maximum(self._force * self._rate, 0.0).sum(axis=1)
+        power /= task.config.substeps
+        moment, diverged = self._moment(before, power), self.physics.failed()
+        terms, measures = task.rewards(moment), task.measures(moment)
+        reached = task.reached(moment) & ~diverged
+        self._count += 1
+        self._energy += power * period
+        self._distance += np.abs(task.speed(moment)) * period
+        info: dict[str, NDArray[np.generic]] = {f"reward/{name}": term * period for name, term in terms.items()}
+        reward = np.where(diverged, 0.0, sum(info.values()))
+        info |= measures | {"power": power, "diverged": diverged, "reached": reached} | self._limits.measures()
+        info["cost_of_transport"] = self._energy / (self._weight * np.maximum(self._distance, 1e-3))
+        terminated = task.failed(moment) | reached | diverged
+        truncated = (self._count >= task.config.steps) & ~terminated
+        return Outcome(self._observe(moment), reward, terminated, truncated, info)
+
+    def _moment(self, before: Array, power: Array) -> Moment:
+        return Moment(
+            before=before,
+            qpos=self._qpos,
+            qvel=self._qvel,
+            sensors=self._sensors,
+            gravity=self.ground.gravity,
+            command=self._command,
+            action=self._action,
+            last=self._last,
+            power=power,
+            period=self.task.config.period,
+        )
+
+    def _observe(self, moment: Moment) -> Observation:
+        seen = self.task.observe(moment)
+        if self.task.config.observe_ground:
+            seen = np.hstack([seen, self.ground.draws])
+        return seen.astype(np.float32)

@@ -1,0 +1,105 @@
+"""`rftsim/FourFlapRunner-v0`: a wheel of four flaps runs fast, and cheaply."""
+
+import dataclasses
+from typing import Any, Final, Literal
+
+import mujoco
+import numpy as np
+from rftsim_models.wheels import FOUR_FLAP_RUNNER, build_wheel
+
+from rftsim_envs.physics import Array
+from rftsim_envs.task import Config, Moment, Task
+
+TOP_RATE: Final = 30.0
+"""Of the drive [rad/s]."""
+TORQUE: Final = 20.0
+"""Most that the drive gives [N m]; twice the weight times the outer radius."""
+GAIN: Final = 20.0
+"""Of the rate servo [N m s]."""
+UNIT: Final = float(np.sqrt(FOUR_FLAP_RUNNER.gravity * 2 * FOUR_FLAP_RUNNER.outer_radius))
+"""Speed that the reward counts in, sqrt(g l), l the outer diameter [m/s]."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class RunnerConfig(Config):
+    """Settings of the runner.
+
+    Attributes:
+        energy: Weight of the squared power in the reward. A supply's losses grow with the square of its current, so
+            bursts cost more than a steady draw.
+    """
+
+    sand: str = "preset=poppy-seeds,lambda_=4"
+    law: Literal["rft2d", "drft2d", "rft3d", "drft3d"] = "drft2d"
+    timestep: float = 0.002
+    period: float = 0.01
+    duration: float = 4.0
+    energy: float = 0.5
+
+
+class FourFlapRunner(Task):
+    """The runner of [Agarwal] Table 4.3 (10.5 kg, four flaps of 70 mm) in the x-z plane, its rate commanded.
+
+    Action, 1 number: rate of the drive, -1 to 1 for -30 to 30 rad/s; the drive gives up to 20 N m.
+
+    | observation | size | unit |
+    |---|---|---|
+    | sine and cosine of four times the angle | 2 | - |
+    | rate | 1 | 30 rad/s |
+    | velocity along x and z | 2 | sqrt(g l) = 1.36 m/s |
+    | height of the axle | 1 | 0.1 m |
+    | last action | 1 | - |
+
+    Reward per second: v / sqrt(g l) - energy (P / (m g sqrt(g l)))^2, v the speed along x and P the drive's positive
+    power, both means over the control step.
+    The episode ends after its duration only.
+
+    `info`: `speed` [m/s], `rate` [rad/s], `slip` 1 - v / (R rate), and what all tasks tell.
+    """
+
+    Settings = RunnerConfig
+    felt = ("wheel",)
+    planar = True
+    edge = 2.0
+    naction = 1
+    config: RunnerConfig
+
+    def build(self) -> mujoco.MjSpec:
+        """See `Task`."""
+        spec = build_wheel(FOUR_FLAP_RUNNER, 0.0)
+        servo = spec.actuator("rate")
+        servo.set_to_velocity(kv=GAIN)
+        servo.forcelimited, servo.forcerange = True, [-TORQUE, TORQUE]
+        return spec
+
+    def start(self, rng: np.random.Generator, qpos: Array, qvel: Array) -> Array:
+        """At rest on the sand, at any angle."""
+        qpos[2] = rng.uniform(0.0, 2.0 * np.pi)
+        qvel[:] = 0.0
+        return np.empty(0)
+
+    def controls(self, action: Array, moment: Moment) -> Array:
+        """See `Task`."""
+        return np.hstack([TOP_RATE * action, np.zeros_like(action)])
+
+    def observe(self, moment: Moment) -> Array:
+        """See `Task`."""
+        angle, (vx, vz, rate) = 4.0 * moment.qpos[:, 2], moment.qvel.T
+        columns = np.sin(angle), np.cos(angle), rate / TOP_RATE, vx / UNIT, vz / UNIT, 10.0 * moment.qpos[:, 1]
+        return np.column_stack([*columns, moment.action])
+
+    def rewards(self, moment: Moment) -> dict[str, Array]:
+        """See `Task`."""
+        weight = float(self.model.body_mass.sum() * np.linalg.norm(self.model.opt.gravity))
+        return running(self.speed(moment), moment.power, UNIT, weight, self.config.energy)
+
+    def measures(self, moment: Moment) -> dict[str, Array]:
+        """See `Task`."""
+        speed, rate = self.speed(moment), moment.qvel[:, 2]
+        slip = 1.0 - speed / np.maximum(FOUR_FLAP_RUNNER.outer_radius * rate, 1e-3)
+        return {"speed": speed, "rate": rate, "slip": slip}
+
+
+def running(speed: Array, power: Array, unit: float, weight: float, energy: float) -> dict[str, Array]:
+    """Fast, at a steady draw: both without dimensions."""
+    return {"speed": speed / unit, "power": -energy * (power / (weight * unit)) ** 2}

@@ -1,0 +1,112 @@
+"""What is under a robot: sand, whose strength, friction and slope may differ in each episode, or a rigid floor."""
+
+import math
+from typing import Final, NamedTuple
+
+import mujoco
+import numpy as np
+from rftsim_envs.physics import Array, Physics
+from rftsim_envs.task import Config, Task
+
+from rftsim import add_sand, instances
+from rftsim.packed import SAND_FIELDS
+
+FRICTION: Final = 0.8
+"""Of the rigid floor [-]."""
+FLOOR: Final = "floor"
+NUMBERS: Final = 4
+"""How many numbers tell of a ground."""
+
+
+class Draw(NamedTuple):
+    """The ground of one episode."""
+
+    strength: float
+    """Factor of xi_n and zeta."""
+    friction: float
+    """Factor of the friction."""
+    downhill: tuple[float, float]
+    """Sines of the slope along x and y."""
+
+
+def lay(task: Task) -> mujoco.MjModel:
+    """The task's robot on its ground, compiled."""
+    config, spec = task.config, task.build()
+    spec.option.timestep = config.timestep
+    if config.ground == "sand":
+        add_sand(spec, config.sand, config.law, bodies=task.felt, max_edge=task.edge, **task.options())
+    else:
+        _add_floor(spec)
+    return spec.compile()
+
+
+def _add_floor(spec: mujoco.MjSpec) -> None:
+    spec.add_texture(
+        name=FLOOR,
+        type=mujoco.mjtTexture.mjTEXTURE_2D,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
+        width=256,
+        height=256,
+        rgb1=[0.45, 0.48, 0.52],
+        rgb2=[0.52, 0.55, 0.60],
+    )
+    material = spec.add_material(name=FLOOR, texrepeat=[4, 4], texuniform=True)
+    material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = FLOOR
+    spec.worldbody.add_geom(
+        name=FLOOR,
+        type=mujoco.mjtGeom.mjGEOM_PLANE,
+        size=[0, 0, 0.1],
+        contype=0,
+        conaffinity=1,
+        friction=[FRICTION, 0.005, 0.0001],
+        priority=1,  # the floor's friction counts, whatever the robot's
+        material=FLOOR,
+    )
+
+
+def draw(config: Config, planar: bool, rng: np.random.Generator) -> Draw:
+    """A ground for an episode."""
+    strength, friction = (math.exp(rng.uniform(*np.log(pair))) for pair in (config.strength, config.friction))
+    slope, way = math.radians(rng.uniform(0.0, config.slope_deg)), rng.uniform(0.0, 2.0 * math.pi)
+    if planar:
+        return Draw(strength, friction, (math.sin(slope) * (1.0 if way < math.pi else -1.0), 0.0))
+    return Draw(strength, friction, (math.sin(slope) * math.cos(way), math.sin(slope) * math.sin(way)))
+
+
+class Ground:
+    """The ground of several simulations.
+
+    Attributes:
+        draws: What tells of each: log strength, log friction, sines of the slope along x and y; (n, NUMBERS).
+        gravity: Unit vectors downward, (n, 3).
+    """
+
+    def __init__(self, physics: Physics, config: Config) -> None:
+        model, self._rigid = physics.model, config.ground == "rigid"
+        self._pull = float(np.linalg.norm(model.opt.gravity))
+        self._gravity = physics.setting("opt.gravity")
+        self.gravity = np.tile([0.0, 0.0, -1.0], (physics.n, 1))
+        self.draws = np.zeros((physics.n, NUMBERS))
+        if self._rigid:
+            self._sliding = physics.setting("geom_friction")[:, model.geom(FLOOR).id]
+            self._before = self._sliding[0].copy()
+        else:
+            sand = instances(model)[0].sand
+            first = (sand.ctypes.data - model.numeric_data.ctypes.data) // sand.itemsize
+            self._sand: Array = physics.setting("numeric_data")[:, first : first + sand.size]
+            self._before = sand.copy()
+
+    def put(self, i: int, drawn: Draw) -> None:
+        """Give simulation i the ground of an episode."""
+        if self._rigid:
+            self._sliding[i, 0] = drawn.friction * self._before[0]
+        else:
+            for name in ("xi_n", "zeta"):
+                k = SAND_FIELDS.index(name)
+                self._sand[i, k] = drawn.strength * self._before[k]
+            k = SAND_FIELDS.index("mu_surf")
+            self._sand[i, k] = drawn.friction * self._before[k]
+        x, y = drawn.downhill
+        self.gravity[i] = x, y, -math.sqrt(1.0 - x * x - y * y)
+        self._gravity[i] = self._pull * self.gravity[i]
+        self.draws[i] = math.log(drawn.strength), math.log(drawn.friction), x, y

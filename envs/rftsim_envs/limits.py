@@ -1,0 +1,43 @@
+"""Where a step leaves the range in which resistive force theory holds, cheaply enough for each one."""
+
+import numpy as np
+from numpy.typing import NDArray
+from rftsim_envs.physics import Physics
+
+from rftsim import instances
+from rftsim.packed import SAND_FIELDS
+from rftsim.validity import DEPTH_LIMIT, FROUDE_LIMIT
+
+
+class Limits:
+    """The numbers of `rftsim.validity` from the boxes around the bodies that feel the sand, not from their triangles."""
+
+    def __init__(self, physics: Physics) -> None:
+        beds = instances(physics.model)
+        self._bodies = [body for bed in beds for body in bed.bodies]
+        if not self._bodies:
+            return
+        boxes = np.array([surface[1:7] for bed in beds for surface in bed.bodies.values()])
+        self._centre, self._half = 0.5 * (boxes[:, :3] + boxes[:, 3:]), 0.5 * (boxes[:, 3:] - boxes[:, :3])
+        self._size = 2.0 * self._half.max(axis=1)
+        self._dynamic = bool(beds[0].sand[SAND_FIELDS.index("dynamic")])
+        self._limit = np.sqrt(beds[0].sand[SAND_FIELDS.index("g")] * self._size)
+        self._place, self._turn = physics.field("xpos"), physics.field("xmat")
+        self._velocity, self._com = physics.field("cvel"), physics.field("subtree_com")
+        self._roots = physics.model.body_rootid[self._bodies]
+
+    def measures(self) -> dict[str, NDArray[np.generic]]:
+        """`froude` and `depth_ratio`: the largest of the bodies in the sand, (n,); `in_range`: whether the law holds."""
+        if not self._bodies:
+            return {}
+        turn = self._turn[:, self._bodies].reshape(-1, len(self._bodies), 3, 3)
+        arm = np.einsum("nbij,bj->nbi", turn, self._centre)
+        centre = self._place[:, self._bodies] + arm
+        depth = np.einsum("nbi,bi->nb", np.abs(turn[:, :, 2]), self._half) - centre[:, :, 2]
+        twist = self._velocity[:, self._bodies]
+        velocity = twist[..., 3:] + np.cross(twist[..., :3], centre - self._com[:, self._roots])
+        touched = depth > 0.0
+        froude = np.where(touched, np.linalg.norm(velocity, axis=2) / self._limit, 0.0).max(axis=1)
+        ratio = np.where(touched, depth / self._size, 0.0).max(axis=1)
+        in_range = (ratio <= DEPTH_LIMIT) & (self._dynamic | (froude <= FROUDE_LIMIT))
+        return {"froude": froude, "depth_ratio": ratio, "in_range": in_range}

@@ -1,0 +1,145 @@
+"""Simulations of one model side by side: one on MuJoCo's own data, or many on `mujoco.batch`.
+
+Both hand out the same arrays, whose first axis counts the simulations, and step bit-identically.
+"""
+
+import copy
+from collections.abc import Callable, Sequence
+from typing import Final, Protocol
+
+import mujoco
+import numpy as np
+from mujoco.batch import Batch
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+_FATAL: Final = [
+    int(kind)
+    for kind in (
+        mujoco.mjtWarning.mjWARN_BADQPOS,
+        mujoco.mjtWarning.mjWARN_BADQVEL,
+        mujoco.mjtWarning.mjWARN_BADQACC,
+        mujoco.mjtWarning.mjWARN_BADCTRL,
+    )
+]
+"""Warnings after which MuJoCo has reset the state, time included, or dropped the controls."""
+
+
+class Physics(Protocol):
+    """Several simulations of one model."""
+
+    model: mujoco.MjModel
+    """The model; the sand of a simulation is in `setting("numeric_data")`."""
+    n: int
+    """How many simulations."""
+    shown: mujoco.MjModel
+    """The model that `snapshot`'s data belong to."""
+
+    def field(self, name: str) -> Array:
+        """A field of MjData, live, (n, ...). What is not state is that of the last time step's start."""
+        ...
+
+    def setting(self, name: str) -> Array:
+        """A field of MjModel, or an option as `opt.gravity`; live and writable, (n, ...)."""
+        ...
+
+    def step(self) -> None:
+        """One time step of each simulation."""
+        ...
+
+    def restart(self, chosen: Sequence[int], place: Callable[[], None]) -> None:
+        """Take the chosen simulations to the model's initial state, let `place` write to it, and compute the rest."""
+        ...
+
+    def failed(self) -> Flags:
+        """Which simulations MuJoCo has given up since their restart, (n,)."""
+        ...
+
+    def snapshot(self, i: int) -> mujoco.MjData:
+        """Data of simulation i to look at; `shown` becomes its model."""
+        ...
+
+
+class One:
+    """One simulation, on data of its own."""
+
+    def __init__(self, model: mujoco.MjModel) -> None:
+        self.model = self.shown = model
+        self.data, self.n = mujoco.MjData(model), 1
+
+    def field(self, name: str) -> Array:
+        """See `Physics`."""
+        view: Array = getattr(self.data, name)[None]
+        return view
+
+    def setting(self, name: str) -> Array:
+        """See `Physics`."""
+        option = name.removeprefix("opt.")
+        view: Array = getattr(self.model if option == name else self.model.opt, option)[None]
+        return view
+
+    def step(self) -> None:
+        """See `Physics`."""
+        mujoco.mj_step(self.model, self.data)
+
+    def restart(self, chosen: Sequence[int], place: Callable[[], None]) -> None:
+        """See `Physics`."""
+        mujoco.mj_resetData(self.model, self.data)
+        place()
+        mujoco.mj_forward(self.model, self.data)
+
+    def failed(self) -> Flags:
+        """See `Physics`."""
+        return np.array([any(self.data.warning[kind].number for kind in _FATAL)])
+
+    def snapshot(self, i: int) -> mujoco.MjData:
+        """See `Physics`."""
+        return self.data
+
+
+class Many:
+    """Many simulations on threads.
+
+    Args:
+        model: What all simulate; copied.
+        n: How many.
+        threads: 0 for as many as there are processors.
+    """
+
+    def __init__(self, model: mujoco.MjModel, n: int, threads: int = 0) -> None:
+        self.model, self.shown, self.n = model, copy.copy(model), n
+        self._batch, self._data = Batch(model, n, threads), mujoco.MjData(self.shown)
+
+    def field(self, name: str) -> Array:
+        """See `Physics`."""
+        view: Array = self._batch.bind(name)
+        return view
+
+    def setting(self, name: str) -> Array:
+        """See `Physics`."""
+        view: Array = self._batch.expand(name)
+        return view
+
+    def step(self) -> None:
+        """See `Physics`."""
+        self._batch.step()
+
+    def restart(self, chosen: Sequence[int], place: Callable[[], None]) -> None:
+        """See `Physics`."""
+        self._batch.reset(chosen, stage=mujoco.mjtStage.mjSTAGE_NONE.value)
+        place()
+        self._batch.forward(chosen)
+
+    def failed(self) -> Flags:
+        """See `Physics`."""
+        counts: NDArray[np.int32] = self._batch.warning[:, _FATAL, 1]
+        return counts.any(axis=1)
+
+    def snapshot(self, i: int) -> mujoco.MjData:
+        """See `Physics`; what is not state is that of an mj_forward."""
+        self._batch.get_model(i, self.shown)
+        self._batch.get_data(i, self._data)
+        mujoco.mj_forward(self.shown, self._data)
+        return self._data

@@ -1,0 +1,19 @@
+"""The tasks by name."""
+
+from typing import Any, Final
+
+from rftsim_envs.four_flap_runner import FourFlapRunner
+from rftsim_envs.task import ConfigError, Task, make_config
+
+TASKS: Final[dict[str, type[Task]]] = {task.__name__: task for task in (FourFlapRunner,)}
+
+
+def make(name: str, settings: dict[str, Any]) -> Task:
+    """A task with its settings.
+
+    Raises:
+        ConfigError: No such task or setting, or a value that cannot be.
+    """
+    if name not in TASKS:
+        raise ConfigError(f"no task {name!r}; tasks are {', '.join(TASKS)}")
+    return TASKS[name](make_config(TASKS[name], settings))
