@@ -82,3 +82,39 @@ def _band(first: int, second: int, n: int) -> list[tuple[int, int, int]]:
         c, d = second + (k + 1) % n, second + k
         faces += [(a, c, b), (a, d, c)]
     return faces
+
+
+def lofted(rings: Array) -> tuple[Array, Faces]:
+    """The solid between rings of points, one after another, closed by a fan at each end: vertices and outward faces.
+
+    Args:
+        rings: (rings, points, 3); the first point of each ring follows the first of the one before; [m].
+    """
+    count, n, _ = rings.shape
+    hubs = rings[[0, -1]].mean(axis=1)
+    vertices = np.concatenate([rings.reshape(-1, 3), hubs])
+    faces = [face for ring in range(count - 1) for face in _band(ring * n, (ring + 1) * n, n)]
+    last = (count - 1) * n
+    for k in range(n):
+        after = (k + 1) % n
+        faces += [(k, after, count * n), (last + after, last + k, count * n + 1)]
+    found = np.array(faces)
+    a, b, c = np.moveaxis(vertices[found], 1, 0)
+    inside_out = np.einsum("ij,ij->", a, np.cross(b, c)) < 0.0
+    return vertices, found[:, ::-1] if inside_out else found
+
+
+def box(length: float, width: float, height: float, *, along: int, across: int) -> tuple[Array, Faces]:
+    """A box about the origin, with `along` x `across` rectangles in its lower and upper faces; [m]."""
+    y = np.linspace(-width / 2, width / 2, across + 1)
+    y, z = np.concatenate([y, y[::-1]]), np.repeat([-height / 2, height / 2], across + 1)
+    x = np.linspace(-length / 2, length / 2, along + 1)
+    return lofted(np.array([np.column_stack([np.full(len(y), level), y, z]) for level in x]))
+
+
+def ball(radius: float, *, sections: int, rings: int) -> tuple[Array, Faces]:
+    """A ball about the origin [m], of so many meridians and parallels, flat at the poles, where its width ends."""
+    latitude = np.pi * (np.arange(rings) + 0.5) / rings
+    angle = 2 * np.pi * (np.arange(sections) + 0.5) / sections
+    circle = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(sections)])
+    return lofted(radius * (np.sin(latitude)[:, None, None] * circle + np.cos(latitude)[:, None, None] * [0, 0, 1.0]))
