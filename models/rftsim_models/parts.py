@@ -148,7 +148,7 @@ def add_servo(
     """
     servo = spec.add_actuator(name=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT, target=joint)
     if kp > 0.0:
-        servo.set_to_position(kp=kp, kv=[kv])
+        servo.set_to_position(kp=kp, kv=kv)
     else:
         servo.set_to_velocity(kv=kv)
     servo.forcerange, servo.ctrlrange = [-torque, torque], limit
