@@ -112,9 +112,10 @@ def box(length: float, width: float, height: float, *, along: int, across: int) 
     return lofted(np.array([np.column_stack([np.full(len(y), level), y, z]) for level in x]))
 
 
-def ball(radius: float, *, sections: int, rings: int) -> tuple[Array, Faces]:
-    """A ball about the origin [m], of so many meridians and parallels, flat at the poles, where its width ends."""
+def pad(radius: float, height: float, *, sections: int, rings: int) -> tuple[Array, Faces]:
+    """A flattened ball about the origin [m], of so many meridians and parallels; between these it is flat."""
     latitude = np.pi * (np.arange(rings) + 0.5) / rings
     angle = 2 * np.pi * (np.arange(sections) + 0.5) / sections
-    circle = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(sections)])
-    return lofted(radius * (np.sin(latitude)[:, None, None] * circle + np.cos(latitude)[:, None, None] * [0, 0, 1.0]))
+    circle = radius * np.column_stack([np.cos(angle), np.sin(angle), np.zeros(sections)])
+    up = np.array([0.0, 0.0, height / 2])
+    return lofted(np.sin(latitude)[:, None, None] * circle + np.cos(latitude)[:, None, None] * up)
