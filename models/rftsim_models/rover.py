@@ -24,16 +24,17 @@ BOGIE_LIMIT: Final = 0.6
 ROVER_WHEEL: Final = WheelParameters(
     radius=0.062,
     width=0.06,
-    lugs=10,
+    lugs=12,
     lug_height=0.006,
     lug_width=0.004,
     felt_height=1 / 3,
     vertical_mass=0.35,
     horizontal_mass=0.35,
     gravity=9.81,
-    arc=2,
+    arc=4,
     flank=1,
     top=1,
+    rings=1,
 )
 """About Sojourner's wheels, of 65 mm radius and 60 mm width, with fewer cleats."""
 

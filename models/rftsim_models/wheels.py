@@ -1,11 +1,12 @@
 """Wheels on a carriage: the grousered wheel and the four-flap runner of [Agarwal] chapter 4.
 
 Both move in the x-z plane: a carriage slides along x, an axle slides along z in it, and the wheel turns about the axle
-(axis y, so that positive spin rolls it towards +x) at a rate that a stiff servo imposes.
+(axis y, so that positive spin rolls it towards +x), by default at a rate that a stiff servo imposes.
 """
 
 import dataclasses
-from typing import Final
+import math
+from typing import Final, Literal, get_args
 
 import mujoco
 import numpy as np
@@ -17,6 +18,8 @@ WHEEL: Final = "wheel"
 CARRIAGE: Final = "carriage"
 SERVO: Final = 1e4
 """Gain of the rate servo [N m s], stiff enough to impose the rate to a few parts in 1e4."""
+Drive = Literal["rate", "torque"]
+DRIVES: Final = get_args(Drive)
 VISUAL_GROUP: Final = 2
 SAND_GROUP: Final = 3
 """Geom groups: what is looked at, and what the sand presses on."""
@@ -130,11 +133,35 @@ FOUR_FLAP_RUNNER: Final = WheelParameters(
 """[Agarwal] Table 4.3: the four-flap runner."""
 
 
-def build_wheel(parameters: WheelParameters, rpm: float) -> mujoco.MjSpec:
-    """A wheel on its carriage, touching level ground at z = 0, with the rate imposed [revolutions per minute].
+def build_wheel(
+    parameters: WheelParameters,
+    rpm: float,
+    *,
+    drive: Drive = "rate",
+    gain: float = SERVO,
+    torque_limit: float = math.inf,
+) -> mujoco.MjSpec:
+    """A wheel on its carriage, touching level ground at z = 0.
 
-    Sensors: `position` (x and z of the axle), `velocity`, `rate`, `torque`.
+    The first actuator has its drive's name and turns the wheel, the second, `push`, pushes the carriage along x.
+    Sensors: `x` and `z` of the axle, `speed`, `rate`, `torque`.
+
+    Args:
+        parameters: The wheel's.
+        rpm: Rate at the start, and that the rate servo aims at [revolutions per minute].
+        drive: What the first control is: a servo's `rate` [rad/s], or the axle's `torque` [N m], zero at the start.
+        gain: Of the rate servo [N m s]; where its torque is limited, above twice the wheel's inertia over the time step
+            the torque jumps from limit to limit.
+        torque_limit: Largest torque [N m].
+
+    Raises:
+        ValueError: No such drive, or a gain or limit that is not positive.
     """
+    if drive not in DRIVES:
+        raise ValueError(f"no drive {drive!r}; drives are {', '.join(DRIVES)}")
+    for name, value in (("gain", gain), ("torque_limit", torque_limit)):
+        if not value > 0.0:
+            raise ValueError(f"{name} must be positive, not {value}")
     spec = mujoco.MjSpec()
     spec.modelname = "wheel"
     spec.option.gravity = [0, 0, -parameters.gravity]
@@ -164,13 +191,20 @@ def build_wheel(parameters: WheelParameters, rpm: float) -> mujoco.MjSpec:
         conaffinity=0,
         rgba=[0.55, 0.60, 0.68, 1],
     )
-    servo = spec.add_actuator(name="rate", trntype=mujoco.mjtTrn.mjTRN_JOINT, target="axle")
-    servo.set_to_velocity(kv=SERVO)
+    motor = spec.add_actuator(name=drive, trntype=mujoco.mjtTrn.mjTRN_JOINT, target="axle")
+    if drive == "rate":
+        motor.set_to_velocity(kv=gain)
+    else:
+        motor.set_to_motor()
+    if math.isfinite(torque_limit):
+        motor.forcerange = [-torque_limit, torque_limit]
     push = spec.add_actuator(name="push", trntype=mujoco.mjtTrn.mjTRN_JOINT, target="x")
     push.set_to_motor()
     rate = rpm * 2 * np.pi / 60
     rolling = 0.8 * parameters.outer_radius * rate  # near the steady state, seconds away from rest
-    spec.add_key(name="start", qvel=[rolling, 0, rate], ctrl=[rate, parameters.forward_force])
+    spec.add_key(
+        name="start", qvel=[rolling, 0, rate], ctrl=[rate if drive == "rate" else 0.0, parameters.forward_force]
+    )
     sensor = mujoco.mjtSensor
     for name, kind, joint in (
         ("x", sensor.mjSENS_JOINTPOS, "x"),
@@ -179,7 +213,7 @@ def build_wheel(parameters: WheelParameters, rpm: float) -> mujoco.MjSpec:
         ("rate", sensor.mjSENS_JOINTVEL, "axle"),
     ):
         spec.add_sensor(name=name, type=kind, objtype=mujoco.mjtObj.mjOBJ_JOINT, objname=joint)
-    spec.add_sensor(name="torque", type=sensor.mjSENS_ACTUATORFRC, objtype=mujoco.mjtObj.mjOBJ_ACTUATOR, objname="rate")
+    spec.add_sensor(name="torque", type=sensor.mjSENS_ACTUATORFRC, objtype=mujoco.mjtObj.mjOBJ_ACTUATOR, objname=drive)
     return spec
 
 
