@@ -102,7 +102,7 @@ def build_quadruped(parameters: QuadrupedParameters = QUADRUPED) -> mujoco.MjSpe
     for leg in LEGS:
         _add_leg(spec, torso, leg, p)
     parts.add_senses(spec, torso)
-    parts.add_camera(torso, 2.6 * p.length)
+    parts.add_camera(torso, 3.2 * p.length)
     pose = 4 * [0, p.crouch, -2 * p.crouch]
     parts.add_start(spec, [0, 0, 0, 1, 0, 0, 0, *pose], pose)
     return spec
