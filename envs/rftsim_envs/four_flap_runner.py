@@ -10,7 +10,7 @@ from rftsim_models.wheels import FOUR_FLAP_RUNNER, build_wheel
 from rftsim_envs.physics import Array
 from rftsim_envs.task import Config, Moment, Task
 
-TOP_RATE: Final = 30.0
+TOP_RATE: Final = 20.0
 """Of the drive [rad/s]."""
 TORQUE: Final = 20.0
 """Most that the drive gives [N m]; twice the weight times the outer radius."""
@@ -31,21 +31,21 @@ class RunnerConfig(Config):
 
     sand: str = "preset=poppy-seeds,lambda_=4"
     law: Literal["rft2d", "drft2d", "rft3d", "drft3d"] = "drft2d"
-    timestep: float = 0.002
-    period: float = 0.01
-    duration: float = 4.0
-    energy: float = 0.5
+    timestep: float = 0.005
+    period: float = 0.02
+    duration: float = 5.0
+    energy: float = 1.0
 
 
 class FourFlapRunner(Task):
     """The runner of [Agarwal] Table 4.3 (10.5 kg, four flaps of 70 mm) in the x-z plane, its rate commanded.
 
-    Action, 1 number: rate of the drive, -1 to 1 for -30 to 30 rad/s; the drive gives up to 20 N m.
+    Action, 1 number: rate of the drive, -1 to 1 for -20 to 20 rad/s; the drive gives up to 20 N m.
 
     | observation | size | unit |
     |---|---|---|
     | sine and cosine of four times the angle | 2 | - |
-    | rate | 1 | 30 rad/s |
+    | rate | 1 | 20 rad/s |
     | velocity along x and z | 2 | sqrt(g l) = 1.36 m/s |
     | height of the axle | 1 | 0.1 m |
     | last action | 1 | - |

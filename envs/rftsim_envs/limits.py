@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 from rftsim_envs.physics import Physics
+from rftsim_envs.task import cross
 
 from rftsim import instances
 from rftsim.packed import SAND_FIELDS
@@ -35,9 +36,10 @@ class Limits:
         centre = self._place[:, self._bodies] + arm
         depth = np.einsum("nbi,bi->nb", np.abs(turn[:, :, 2]), self._half) - centre[:, :, 2]
         twist = self._velocity[:, self._bodies]
-        velocity = twist[..., 3:] + np.cross(twist[..., :3], centre - self._com[:, self._roots])
+        velocity = twist[..., 3:] + cross(twist[..., :3], centre - self._com[:, self._roots])
         touched = depth > 0.0
-        froude = np.where(touched, np.linalg.norm(velocity, axis=2) / self._limit, 0.0).max(axis=1)
+        speed = np.sqrt((velocity**2).sum(axis=2))
+        froude = np.where(touched, speed / self._limit, 0.0).max(axis=1)
         ratio = np.where(touched, depth / self._size, 0.0).max(axis=1)
         in_range = (ratio <= DEPTH_LIMIT) & (self._dynamic | (froude <= FROUDE_LIMIT))
         return {"froude": froude, "depth_ratio": ratio, "in_range": in_range}

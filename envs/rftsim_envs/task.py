@@ -3,7 +3,7 @@
 import abc
 import dataclasses
 import math
-from typing import Any, ClassVar, Final, Literal, NamedTuple, get_args, get_origin, get_type_hints
+from typing import Any, ClassVar, Literal, NamedTuple, get_args, get_origin, get_type_hints
 
 import mujoco
 import numpy as np
@@ -215,14 +215,20 @@ def make_config(task: type[Task], settings: dict[str, Any]) -> Config:
     return task.Settings(**settings)
 
 
-UPRIGHT: Final = np.array([0.0, 0.0, -1.0])
+def cross(a: Array, b: Array) -> Array:
+    """Cross product of vectors along the last axis; NumPy's takes five times as long on few."""
+    ax, ay, az, bx, by, bz = *(a[..., k] for k in range(3)), *(b[..., k] for k in range(3))
+    x = ay * bz - az * by
+    result: Array = np.empty((*x.shape, 3))
+    result[..., 0], result[..., 1], result[..., 2] = x, az * bx - ax * bz, ax * by - ay * bx
+    return result
 
 
 def to_body(quaternion: Array, vector: Array) -> Array:
     """A world vector in the axes of a body with orientation wxyz: (n, 4), (n, 3) to (n, 3)."""
     w, axis = quaternion[:, :1], -quaternion[:, 1:]
-    turned = 2.0 * np.cross(axis, vector)
-    result: Array = vector + w * turned + np.cross(axis, turned)
+    turned = 2.0 * cross(axis, vector)
+    result: Array = vector + w * turned + cross(axis, turned)
     return result
 
 

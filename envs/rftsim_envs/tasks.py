@@ -2,10 +2,12 @@
 
 from typing import Any, Final
 
+from rftsim_envs.c_leg_hexapod import CLegHexapod
 from rftsim_envs.four_flap_runner import FourFlapRunner
+from rftsim_envs.hopper import Hopper
 from rftsim_envs.task import ConfigError, Task, make_config
 
-TASKS: Final[dict[str, type[Task]]] = {task.__name__: task for task in (FourFlapRunner,)}
+TASKS: Final[dict[str, type[Task]]] = {task.__name__: task for task in (FourFlapRunner, CLegHexapod, Hopper)}
 
 
 def make(name: str, settings: dict[str, Any]) -> Task:

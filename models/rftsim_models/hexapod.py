@@ -60,7 +60,7 @@ class HexapodParameters:
     gain: float = 1.0
     armature: float = 3e-3
     friction: float = 0.05
-    segments: int = 10
+    segments: int = 7
 
     def __post_init__(self) -> None:
         parts.positive(self, [field.name for field in dataclasses.fields(self) if field.name != "stagger"])
@@ -100,7 +100,7 @@ def build_hexapod(parameters: HexapodParameters = HEXAPOD) -> mujoco.MjSpec:
     spec = parts.new_robot("hexapod")
     torso = spec.worldbody.add_body(name=parts.TORSO, pos=[0, 0, p.hip_height])
     torso.add_freejoint(name="root")
-    solid = box(p.length, p.width, p.height, along=6, across=2)
+    solid = box(p.length, p.width, p.height, along=4, across=2)
     parts.add_felt(spec, torso, solid, p.mass - 6 * p.leg_mass, rgba=parts.BODY_RGBA)
     for name in LEGS:
         _add_leg(spec, torso, name, p)

@@ -1,0 +1,149 @@
+"""`rftsim/Hopper-v0`: one leg with a flat foot hops in the x-z plane at a commanded speed."""
+
+import dataclasses
+from typing import Final
+
+import mujoco
+import numpy as np
+from rftsim_models import parts
+from rftsim_models.hopper import HOPPER, JOINTS, RANGES, build_hopper
+
+from rftsim_envs.physics import Array, Flags
+from rftsim_envs.task import Config, ConfigError, Moment, Task
+
+POSE: Final = np.array([-HOPPER.crouch, 2 * HOPPER.crouch, -HOPPER.crouch])
+"""Of hip, knee and ankle, about which actions move them [rad]."""
+REACH: Final = np.array([0.7, 0.9, 0.7])
+"""How far they move them [rad]."""
+SPREAD: Final = 0.25
+"""Error of the speed at which the reward for it has fallen to 1/e [m/s]."""
+LOWEST: Final = 0.22
+"""Height of the hip below which the hopper has fallen [m]."""
+STEEPEST: Final = 0.9
+"""Lean of the torso beyond which it has fallen [rad]."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class HopperConfig(Config):
+    """Settings of the hopper.
+
+    Attributes:
+        speed: Range of the commanded speed, drawn for each episode [m/s].
+        energy: Weight of the power, over m g times 1 m/s.
+        smooth: Weight of the squared change of the action from step to step.
+    """
+
+    sand: str = "close-poppy-seeds"
+    duration: float = 8.0
+    speed: tuple[float, float] = (0.2, 0.6)
+    energy: float = 0.05
+    smooth: float = 0.02
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not -2.0 <= self.speed[0] <= self.speed[1] <= 2.0:
+            raise ConfigError(f"speed must be a range within -2 and 2 m/s, low to high, not {self.speed}")
+
+
+class Hopper(Task):
+    """A planar hopper of 9 kg on a flat foot of 0.16 x 0.10 m, from a crouch.
+
+    Action, 3 numbers: targets of the position servos of hip, knee and ankle, -1 to 1 for 0.7, 0.9 and 0.7 rad about the
+    crouch.
+
+    | observation | size | unit |
+    |---|---|---|
+    | commanded speed | 1 | m/s |
+    | height of the hip | 1 | 0.5 m |
+    | downward along x and z, in the torso's axes | 2 | - |
+    | angles of hip, knee and ankle from the crouch | 3 | rad |
+    | velocity along x and z | 2 | m/s |
+    | rate of the pitch | 1 | 5 rad/s |
+    | rates of hip, knee and ankle | 3 | 10 rad/s |
+    | last action | 3 | - |
+
+    Reward per second: exp(-((v - command) / 0.25 m/s)^2) + 0.2 - energy P / (m g 1 m/s) - smooth |change of action|^2, P
+    the motors' positive power. The episode ends early where the hopper has fallen: hip below 0.22 m, or torso leaning by
+    more than 0.9 rad.
+
+    `info`: `speed` and `command` [m/s], `height` of the hip [m], and what all tasks tell.
+    """
+
+    Settings = HopperConfig
+    planar = True
+    edge = parts.AS_MESHED
+    ncommand = 1
+    naction = len(JOINTS)
+    config: HopperConfig
+
+    def build(self) -> mujoco.MjSpec:
+        """See `Task`."""
+        return build_hopper()
+
+    def prepare(self, model: mujoco.MjModel) -> None:
+        """See `Task`."""
+        super().prepare(model)
+        self._weight = float(model.body_mass.sum() * np.linalg.norm(model.opt.gravity))
+
+    def start(self, rng: np.random.Generator, qpos: Array, qvel: Array) -> Array:
+        """Near the crouch, nearly at rest; the command is drawn."""
+        qpos[2:] += rng.uniform(-0.03, 0.03, size=4)
+        qvel[:] = rng.uniform(-0.03, 0.03, size=qvel.size)
+        return np.array([rng.uniform(*self.config.speed)])
+
+    def controls(self, action: Array, moment: Moment) -> Array:
+        """See `Task`."""
+        return np.clip(POSE + REACH * action, *np.transpose(RANGES))
+
+    def observe(self, moment: Moment) -> Array:
+        """See `Task`."""
+        columns = [
+            moment.command,
+            moment.qpos[:, 1:2] / 0.5,
+            _lean(moment),
+            moment.qpos[:, 3:] - POSE,
+            moment.qvel[:, :2],
+            moment.qvel[:, 2:3] / 5.0,
+            moment.qvel[:, 3:] / 10.0,
+            moment.action,
+        ]
+        return np.hstack(columns)
+
+    def rewards(self, moment: Moment) -> dict[str, Array]:
+        """See `Task`."""
+        return hopping(
+            self.speed(moment) - moment.command[:, 0],
+            moment.power / self._weight,
+            moment.action - moment.last,
+            self.config.energy,
+            self.config.smooth,
+        )
+
+    def failed(self, moment: Moment) -> Flags:
+        """Fallen."""
+        return (moment.qpos[:, 1] < LOWEST) | (_lean(moment)[:, 1] > -np.cos(STEEPEST))
+
+    def measures(self, moment: Moment) -> dict[str, Array]:
+        """See `Task`."""
+        return {
+            "speed": self.speed(moment),
+            "command": moment.command[:, 0].copy(),
+            "height": moment.qpos[:, 1].copy(),
+        }
+
+
+def _lean(moment: Moment) -> Array:
+    """Downward along the torso's x and z, (n, 2); the pitch turns x to -z."""
+    sine, cosine = np.sin(moment.qpos[:, 2]), np.cos(moment.qpos[:, 2])
+    x, z = moment.gravity[:, 0], moment.gravity[:, 2]
+    return np.column_stack([x * cosine - z * sine, x * sine + z * cosine])
+
+
+def hopping(error: Array, power: Array, change: Array, energy: float, smooth: float) -> dict[str, Array]:
+    """At the commanded speed (error [m/s]), upright, cheap (power over weight [m/s]) and without jerks."""
+    return {
+        "tracking": np.exp(-((error / SPREAD) ** 2)),
+        "upright": np.full(len(error), 0.2),
+        "power": -energy * power,
+        "jerk": -smooth * (change**2).sum(axis=1),
+    }
