@@ -8,6 +8,7 @@ from typing import Any, ClassVar, Literal, NamedTuple, get_args, get_origin, get
 import mujoco
 import numpy as np
 from rftsim_envs.physics import Array, Flags, Physics
+from rftsim_envs.recipe import Drive, Training
 
 from rftsim import RftsimError
 from rftsim.sand import make_sand
@@ -141,6 +142,7 @@ class Task(abc.ABC):
         planar: Whether the robot moves in the x-z plane.
         edge: Longest edge of a felt triangle [m]; None for `add_sand`'s.
         ncommand: Numbers in a command.
+        training: How a policy is trained.
     """
 
     Settings: ClassVar[type[Config]] = Config
@@ -148,6 +150,7 @@ class Task(abc.ABC):
     planar: ClassVar[bool] = False
     edge: ClassVar[float | None] = None
     ncommand: ClassVar[int] = 0
+    training: ClassVar[Training] = Training()
 
     def __init__(self, config: Config) -> None:
         self.config = config
@@ -200,6 +203,10 @@ class Task(abc.ABC):
     def speed(self, moment: Moment) -> Array:
         """Mean speed along x over the step [m/s], (n,)."""
         return (moment.qpos[:, 0] - moment.before[:, 0]) / moment.period
+
+    def open_loops(self) -> dict[str, Drive]:
+        """Controllers that see nothing, by name: the best of them is what a policy has to beat."""
+        return {}
 
 
 def make_config(task: type[Task], settings: dict[str, Any]) -> Config:

@@ -12,6 +12,7 @@ from rftsim.cli.demo import Demo
 from rftsim.cli.force import Force
 from rftsim.cli.inspect import Inspect
 from rftsim.cli.run import Run
+from rftsim.cli.train import Train
 from rftsim.errors import RftsimError, RftsimWarning
 
 Command = (
@@ -20,6 +21,7 @@ Command = (
     | Annotated[Inspect, tyro.conf.subcommand("inspect")]
     | Annotated[Demo, tyro.conf.subcommand("demo")]
     | Annotated[Bench, tyro.conf.subcommand("bench")]
+    | Annotated[Train, tyro.conf.subcommand("train")]
 )
 
 

@@ -1,0 +1,1 @@
+"""Training, playing and judging policies; needs the extra `train`."""

@@ -1,0 +1,267 @@
+"""The folder of a training run: what was asked, how far it is, and what came out; whole at every moment.
+
+config.json      what was asked, resolved; `done` says whether it is finished
+progress.csv     a row per update
+checkpoint.zip   where to go on from
+policy.zip       the trained policy, when it is finished
+tensorboard/     if it was asked for
+"""
+
+import contextlib
+import csv
+import dataclasses
+import fcntl
+import importlib.metadata
+import json
+import os
+import tempfile
+import warnings
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, Final
+
+from rftsim.errors import RftsimWarning
+from rftsim.sand import make_sand
+from rftsim_envs import tasks
+from rftsim_envs.recipe import Training, TrainingError
+
+ALGORITHMS: Final = ("ppo",)
+PACKAGES: Final = ("rftsim", "mujoco", "stable-baselines3", "torch", "numpy")
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Plan:
+    """What is asked of a training run, resolved.
+
+    Attributes:
+        task: One of `rftsim_envs.TASKS`.
+        settings: Every field of the task's Config.
+        training: PPO's settings.
+        seed: Of everything that is drawn.
+        algo: One of `ALGORITHMS`.
+    """
+
+    task: str
+    settings: dict[str, Any]
+    training: Training
+    seed: int = 0
+    algo: str = "ppo"
+
+    def as_json(self) -> dict[str, Any]:
+        """The plan as config.json has it."""
+        plain: dict[str, Any] = json.loads(
+            json.dumps(
+                {
+                    "env": f"rftsim/{self.task}-v0",
+                    "settings": self.settings,
+                    "sand": dataclasses.asdict(make_sand(self.settings["sand"])),
+                    "algo": self.algo,
+                    "training": dataclasses.asdict(self.training),
+                    "seed": self.seed,
+                }
+            )
+        )
+        return plain
+
+
+def make_plan(
+    env: str,
+    settings: Mapping[str, Any] | None = None,
+    changes: Mapping[str, Any] | None = None,
+    *,
+    seed: int = 0,
+    algo: str = "ppo",
+) -> Plan:
+    """A plan.
+
+    Args:
+        env: `rftsim/NAME-v0`, or NAME.
+        settings: Settings of the task that differ from its own.
+        changes: Settings of the training that differ from the task's.
+        seed: Of everything that is drawn.
+        algo: One of `ALGORITHMS`.
+
+    Raises:
+        ConfigError: No such task or setting.
+        TrainingError: No such algorithm or setting of it.
+    """
+    if algo not in ALGORITHMS:
+        raise TrainingError(f"no algorithm {algo!r}; algorithms are {', '.join(ALGORITHMS)}")
+    if seed < 0:
+        raise TrainingError(f"seed must be zero or more, not {seed}")
+    task = tasks.make(name_of(env), dict(settings or {}))
+    training = task.training.replace(changes or {})
+    return Plan(task=name_of(env), settings=dataclasses.asdict(task.config), training=training, seed=seed, algo=algo)
+
+
+def name_of(env: str) -> str:
+    """The task's name, of `rftsim/NAME-v0` or of itself."""
+    return env.removeprefix("rftsim/").removesuffix("-v0")
+
+
+class Folder:
+    """A run's folder.
+
+    Args:
+        path: The folder; nothing is made yet.
+    """
+
+    def __init__(self, path: "str | Path") -> None:
+        self.path = Path(path)
+        self.config, self.progress = self.path / "config.json", self.path / "progress.csv"
+        self.checkpoint, self.policy = self.path / "checkpoint.zip", self.path / "policy.zip"
+        self.tensorboard = self.path / "tensorboard"
+
+    @property
+    def exists(self) -> bool:
+        """Whether a run was begun here."""
+        return self.config.is_file()
+
+    @property
+    def done(self) -> bool:
+        """Whether the run is finished."""
+        return self.exists and bool(self._read()["done"])
+
+    def plan(self) -> Plan:
+        """What was asked.
+
+        Raises:
+            TrainingError: No run was begun here, or its config.json cannot be read.
+        """
+        kept = self._read()
+        try:
+            settings, training = dict(kept["settings"]), Training(**kept["training"])
+            return Plan(
+                task=name_of(kept["env"]), settings=settings, training=training, seed=kept["seed"], algo=kept["algo"]
+            )
+        except (KeyError, TypeError) as error:
+            raise TrainingError(f"{self.config} is not that of a training run: {error}") from error
+
+    def _read(self) -> dict[str, Any]:
+        if not self.exists:
+            raise TrainingError(f"{self.path} holds no training run: it has no {self.config.name}")
+        try:
+            kept = json.loads(self.config.read_text())
+        except (OSError, ValueError) as error:
+            raise TrainingError(f"cannot read {self.config}: {error}") from error
+        if not isinstance(kept, dict) or not {"env", "settings", "training", "seed", "algo", "done"} <= set(kept):
+            raise TrainingError(f"{self.config} is not that of a training run")
+        return kept
+
+    @contextlib.contextmanager
+    def opened(self, plan: Plan) -> Iterator[None]:
+        """The folder for this plan, for nobody else until the block ends.
+
+        Raises:
+            TrainingError: It belongs to another plan or to another process, or it cannot be written.
+        """
+        with contextlib.ExitStack() as stack:
+            try:
+                self.path.mkdir(parents=True, exist_ok=True)
+                lock = stack.enter_context((self.path / ".lock").open("w"))
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise TrainingError(f"another process trains in {self.path}") from None
+            except OSError as error:
+                raise TrainingError(f"cannot write to {self.path}: {error.strerror}") from error
+            self._claim(plan)
+            yield
+
+    def _claim(self, plan: Plan) -> None:
+        asked = plan.as_json()
+        if not self.exists:
+            self.write_config(plan, done=False)
+            return
+        kept = self._read()
+        differing = [
+            f"{name} is {there} there and {here} here"
+            for name, there, here in _differences({key: kept.get(key) for key in asked}, asked)
+        ]
+        if differing:
+            raise TrainingError(f"{self.path} holds another run: {'; '.join(differing)}. Take another folder.")
+        if not kept["done"] and kept.get("versions") != versions():
+            changes = [f"{name} {there} to {here}" for name, there, here in _differences(kept["versions"], versions())]
+            warnings.warn(f"versions changed since {self.path} was begun: {', '.join(changes)}", RftsimWarning, 2)
+
+    def write_config(self, plan: Plan, *, done: bool) -> None:
+        """Write config.json."""
+        text = json.dumps(plan.as_json() | {"versions": versions(), "done": done}, indent=2)
+        write_whole(self.config, f"{text}\n".encode())
+
+
+def versions() -> dict[str, str]:
+    """Of what a run's numbers depend on."""
+    return {name: importlib.metadata.version(name) for name in PACKAGES}
+
+
+def _differences(there: Any, here: Any, name: str = "") -> Iterator[tuple[str, Any, Any]]:
+    if isinstance(there, dict) and isinstance(here, dict):
+        for key in {**there, **here}:
+            yield from _differences(there.get(key), here.get(key), f"{name}.{key}" if name else key)
+    elif there != here:
+        yield name, there, here
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Write a file so that at any moment either the old or the new one is there, whole.
+
+    Raises:
+        TrainingError: It cannot be written; what was there is left.
+    """
+    try:
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}-", suffix=".part")
+        temporary = Path(name)
+        try:
+            with os.fdopen(handle, "wb") as file:
+                file.write(content)
+                file.flush()
+                os.fsync(file.fileno())
+            temporary.chmod(0o644)
+            temporary.replace(path)
+        finally:
+            temporary.unlink(missing_ok=True)
+    except OSError as error:
+        raise TrainingError(f"cannot write {path}: {error.strerror}") from error
+
+
+class Progress:
+    """progress.csv: a row per update.
+
+    Args:
+        path: The file.
+        rows: Rows to keep of the one that is there; others came after the checkpoint.
+    """
+
+    def __init__(self, path: Path, rows: int) -> None:
+        self._path = path
+        self.rows = read_progress(path)[:rows] if path.is_file() else []
+        if self.rows:
+            write_whole(
+                path, ("\n".join(map(_line, [self.rows[0], *(row.values() for row in self.rows)])) + "\n").encode()
+            )
+
+    def add(self, row: Mapping[str, Any]) -> None:
+        """Append a row.
+
+        Raises:
+            TrainingError: It cannot be written.
+        """
+        lines = [_line(row.values())] if self.rows else [_line(row), _line(row.values())]
+        if not self.rows:
+            write_whole(self._path, b"")
+        self.rows.append({name: str(value) for name, value in row.items()})
+        try:
+            with self._path.open("a") as file:
+                file.write("".join(f"{line}\n" for line in lines))
+        except OSError as error:
+            raise TrainingError(f"cannot write {self._path}: {error.strerror}") from error
+
+
+def _line(values: Any) -> str:
+    return ",".join(str(value) for value in values)
+
+
+def read_progress(path: Path) -> list[dict[str, str]]:
+    """The rows of a progress.csv."""
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
