@@ -1,6 +1,8 @@
 """Pictures of runs."""
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Protocol
 
 import matplotlib.image
 import mujoco
@@ -11,6 +13,29 @@ from rftsim.bench.stability import FORCES, Row
 from rftsim.demo import Point
 from rftsim.render import render, watching
 from rftsim.run import STEADY, History
+
+
+class Score(Protocol):
+    """What `plot_returns` draws."""
+
+    @property
+    def ground(self) -> str:
+        """Its name."""
+        ...
+
+    @property
+    def actor(self) -> str:
+        """Who acted."""
+        ...
+
+    def mean(self, name: str) -> float:
+        """Over the episodes."""
+        ...
+
+    def std(self, name: str) -> float:
+        """Over the episodes."""
+        ...
+
 
 LOST = 10.0
 """Relative error at which a simulation counts as lost in pictures."""
@@ -96,4 +121,28 @@ def plot_stability(rows: list[Row], path: Path) -> None:
         axis.legend(loc="lower right")
     left.text(steps[0] * 1e3, LOST, "lost", color="0.4", va="bottom")
     figure.suptitle(f"{len(rows)} hard cases, and their median (bold)")
+    figure.savefig(path, dpi=110)
+
+
+def plot_returns(scores: "Mapping[str, Sequence[Score]]", path: Path) -> None:
+    """Draw the mean return of each actor on each ground, with its standard deviation over the episodes."""
+    figure = Figure(figsize=(9, 1.2 + 3.4 * len(scores)), layout="constrained")
+    panels = figure.subplots(len(scores), 1, squeeze=False)[:, 0]
+    for axis, (title, own) in zip(panels, scores.items(), strict=True):
+        grounds, actors = (
+            list(dict.fromkeys(names)) for names in zip(*((s.ground, s.actor) for s in own), strict=True)
+        )
+        for k, actor in enumerate(actors):
+            drawn = [one for one in own if one.actor == actor]
+            places = [grounds.index(one.ground) + 0.2 * (k - 0.5 * (len(actors) - 1)) for one in drawn]
+            means, stds = [one.mean("r") for one in drawn], [one.std("r") for one in drawn]
+            axis.errorbar(places, means, stds, fmt="o", color=f"C{k}", capsize=3, label=actor)
+        axis.set_xticks(range(len(grounds)), grounds, rotation=25, ha="right")
+        axis.set_ylabel("return per episode [-]")
+        axis.set_title(title)
+        axis.axhline(0.0, color="0.7", linewidth=0.8)
+        axis.grid(alpha=0.3)
+        axis.legend()
+    panels[-1].set_xlabel("ground")
+    figure.suptitle("Mean and standard deviation over the episodes")
     figure.savefig(path, dpi=110)

@@ -8,6 +8,7 @@ import numpy as np
 from rftsim_models.wheels import FOUR_FLAP_RUNNER, build_wheel
 
 from rftsim_envs.physics import Array
+from rftsim_envs.recipe import Drive, constant
 from rftsim_envs.task import Config, Moment, Task
 
 RUNNER: Final = dataclasses.replace(FOUR_FLAP_RUNNER, arc=3, flank=6, top=1)
@@ -94,6 +95,10 @@ class FourFlapRunner(Task):
         """See `Task`."""
         weight = float(self.model.body_mass.sum() * np.linalg.norm(self.model.opt.gravity))
         return running(self.speed(moment), moment.power, UNIT, weight, self.config.energy)
+
+    def open_loops(self) -> dict[str, Drive]:
+        """Constant rates."""
+        return {f"{rate:g} rad/s": constant(rate / TOP_RATE) for rate in (3, 6, 9, 12, 15, 18, 21, 24, 27, 30)}
 
     def measures(self, moment: Moment) -> dict[str, Array]:
         """See `Task`."""

@@ -5,11 +5,18 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any, get_type_hints
 
+import numpy as np
+
 from rftsim.errors import RftsimError
 from rftsim_envs.physics import Array
 
 Drive = Callable[[float], Array]
 """Actions from the time since the episode's start [s], (naction,): a controller that sees nothing."""
+
+
+def constant(*action: float) -> Drive:
+    """Always the same."""
+    return lambda time: np.array(action)
 
 
 class TrainingError(RftsimError):

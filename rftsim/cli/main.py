@@ -6,11 +6,14 @@ from typing import Annotated, Any
 
 import tyro
 from rich.console import Console
+from rich.markup import escape
 
 from rftsim.cli.bench import Bench
 from rftsim.cli.demo import Demo
+from rftsim.cli.evaluate import Evaluate
 from rftsim.cli.force import Force
 from rftsim.cli.inspect import Inspect
+from rftsim.cli.play import Play
 from rftsim.cli.run import Run
 from rftsim.cli.train import Train
 from rftsim.errors import RftsimError, RftsimWarning
@@ -22,6 +25,8 @@ Command = (
     | Annotated[Demo, tyro.conf.subcommand("demo")]
     | Annotated[Bench, tyro.conf.subcommand("bench")]
     | Annotated[Train, tyro.conf.subcommand("train")]
+    | Annotated[Play, tyro.conf.subcommand("play")]
+    | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
 )
 
 
@@ -40,11 +45,11 @@ def main(arguments: list[str] | None = None) -> None:
         try:
             command(lambda: said(caught))
         except (RftsimError, ValueError, OSError) as error:
-            console.print(f"[red]error:[/red] {error}", highlight=False, soft_wrap=True)
+            console.print(f"[red]error:[/red] {escape(str(error))}", highlight=False, soft_wrap=True)
             sys.exit(2)
         finally:
             for text in said(caught):
-                console.print(f"[yellow]warning:[/yellow] {text}", highlight=False, soft_wrap=True)
+                console.print(f"[yellow]warning:[/yellow] {escape(text)}", highlight=False, soft_wrap=True)
 
 
 def said(caught: list[warnings.WarningMessage]) -> list[str]:

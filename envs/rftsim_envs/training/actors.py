@@ -1,0 +1,66 @@
+"""What chooses actions: a trained policy, or what it is compared with."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from stable_baselines3.common.policies import ActorCriticPolicy
+from stable_baselines3.common.save_util import load_from_zip_file
+from stable_baselines3.common.utils import ConstantSchedule
+
+from rftsim_envs.env import spaces
+from rftsim_envs.episodes import Episodes, Observation
+from rftsim_envs.recipe import Drive, TrainingError
+from rftsim_envs.training.folder import Folder
+
+Actor = Callable[[Observation, float], NDArray[Any]]
+"""Actions (n, naction) from what is seen, (n, nobservation), and the time since the episodes' start [s]."""
+Maker = Callable[[Episodes], Actor]
+"""An actor for some episodes."""
+
+
+def trained(folder: Folder) -> Maker:
+    """The policy of a run, without its noise; that of the checkpoint where the run is not finished."""
+    path = folder.policy if folder.policy.is_file() else folder.checkpoint
+    training = folder.plan().training
+
+    def make(episodes: Episodes) -> Actor:
+        policy = ActorCriticPolicy(
+            *spaces(episodes), ConstantSchedule(0.0), list(training.layers), log_std_init=training.log_std_init
+        )
+        try:
+            _, parameters, _ = load_from_zip_file(str(path), device="cpu", load_data=False)
+            policy.load_state_dict(dict(parameters["policy"]))
+        except (OSError, ValueError, KeyError, RuntimeError) as error:
+            raise TrainingError(f"cannot take a policy from {path}: {error}") from error
+        policy.set_training_mode(False)
+
+        def act(seen: Observation, time: float) -> NDArray[Any]:
+            with torch.no_grad():
+                return policy.predict(seen, deterministic=True)[0]
+
+        return act
+
+    return make
+
+
+def at_random(seed: int) -> Maker:
+    """Actions drawn anew in each step, evenly between -1 and 1."""
+
+    def make(episodes: Episodes) -> Actor:
+        rng, naction = np.random.default_rng(seed), episodes.task.naction
+        return lambda seen, time: rng.uniform(-1.0, 1.0, (len(seen), naction))
+
+    return make
+
+
+def zero(episodes: Episodes) -> Actor:
+    """No action."""
+    return lambda seen, time: np.zeros((len(seen), episodes.task.naction))
+
+
+def open_loop(drive: Drive) -> Maker:
+    """A drive that sees nothing, the same in all simulations."""
+    return lambda episodes: lambda seen, time: np.tile(drive(time), (len(seen), 1))

@@ -1,0 +1,82 @@
+"""Episodes one after the other, to look at."""
+
+import contextlib
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any, Final
+
+from rftsim_envs.env import SandEnv
+from rftsim_envs.recipe import TrainingError
+from rftsim_envs.tally import Tally
+from rftsim_envs.training.actors import Maker
+
+FPS: Final = 30.0
+"""Of films."""
+SIZE: Final = (960, 540)
+"""Width and height of films [pixels]."""
+
+
+def play(
+    env: SandEnv,
+    maker: Maker,
+    episodes: int,
+    seed: int,
+    *,
+    seconds: float | None,
+    watch: Callable[[Mapping[str, Any]], None],
+) -> Iterator[dict[str, float]]:
+    """Play; yields what each episode came to.
+
+    Args:
+        env: The environment.
+        maker: Who chooses the actions.
+        episodes: How many.
+        seed: Episode k is seeded with seed + k.
+        seconds: Cut episodes there [s].
+        watch: Called with the info of each control step.
+    """
+    steps = env.config.steps if seconds is None else max(round(seconds / env.config.period), 1)
+    for k in range(episodes):
+        env.reset(seed=seed + k)
+        seen, actor, tally = env.episodes.observation(), maker(env.episodes), Tally(1)
+        for step in range(steps):
+            out = env.episodes.step(actor(seen, step * env.config.period))
+            tally.add(out)
+            watch(out.info)
+            seen = out.observation
+            if out.terminated[0] or out.truncated[0]:
+                break
+        yield tally.take(0)
+
+
+@contextlib.contextmanager
+def filming(env: SandEnv, path: Path) -> Iterator[Callable[[Mapping[str, Any]], None]]:
+    """A film of the environment, which must render: call what is given after each control step.
+
+    Raises:
+        TrainingError: It cannot be written.
+    """
+    import av  # an extra
+
+    taken, every = 0, 1.0 / FPS
+    try:
+        with av.open(str(path), "w") as container:
+            stream = container.add_stream("libx264", rate=round(FPS))
+            stream.width, stream.height, stream.pix_fmt = *SIZE, "yuv420p"
+            clock = 0.0
+
+            def watch(info: Mapping[str, Any]) -> None:
+                nonlocal taken, clock
+                clock += env.config.period
+                while taken * every < clock:
+                    picture = env.render()
+                    assert picture is not None
+                    for packet in stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")):
+                        container.mux(packet)
+                    taken += 1
+
+            yield watch
+            for packet in stream.encode():
+                container.mux(packet)
+    except OSError as error:
+        raise TrainingError(f"cannot write {path}: {error}") from error

@@ -1,0 +1,173 @@
+"""`rftsim evaluate`: how good policies are, on which ground."""
+
+import dataclasses
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import tyro
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import Progress
+from rich.table import Table
+
+from rftsim.cli.extra import needing
+from rftsim.cli.output import check_writable, print_json, replacing
+from rftsim.errors import RftsimError
+
+if TYPE_CHECKING:
+    from rftsim_envs.training.evaluate import Score
+
+NUMBERS = {"speed": "speed [m/s]", "cost_of_transport": "CoT", "early": "early [%]"}
+
+
+@dataclasses.dataclass(frozen=True)
+class Evaluate:
+    """Score trained policies on a grid of grounds, without their noise; episodes are seeded, the same for all.
+
+    A folder is that of one run of `rftsim train`, or of several (--seeds), which count together. Several folders give
+    one table, a row for each: with --on rigid,sand that of transfer.
+
+    Example: rftsim evaluate out/runner --baseline --plot runner.png
+    """
+
+    runs: tyro.conf.Positional[tuple[Path, ...]]
+    """Folders of `rftsim train`."""
+    on: str | None = None
+    """Names of grounds with commas between them; by default all for one folder, and sand,rigid for several."""
+    episodes: int = 20
+    """On each ground."""
+    seed: int = 10_000
+    """Episode k is seeded with seed + k."""
+    baseline: bool = False
+    """Score random actions, too, and the best of the task's drives that see nothing."""
+    plot: Path | None = None
+    """Draw the returns, .png, .pdf or .svg."""
+    markdown: bool = False
+    """Print the table in Markdown, with the command."""
+    threads: int = 0
+    """Threads of the simulations; 0 for as many as there are processors."""
+    ray: str | None = None
+    """Score on Ray, a task for each run and ground: `local`, or the address of a cluster."""
+    json: bool = False
+    """Print JSON."""
+
+    def __call__(self, warnings: Callable[[], list[str]]) -> None:
+        """Score, print and draw."""
+        with needing("train"):
+            from rftsim_envs.training import evaluate
+            from rftsim_envs.training.folder import Folder
+            from rftsim_envs.training.spread import spread
+        if not self.runs or self.episodes < 1:
+            raise RftsimError("evaluate takes at least one folder and one episode")
+        if self.plot:
+            check_writable(self.plot, ".png", ".pdf", ".svg")
+        runs = {group: evaluate.runs(group) for group in self.runs}
+        plans = {group: Folder(own[0]).plan() for group, own in runs.items()}
+        default = evaluate.grid(plans[self.runs[0]]) if len(runs) == 1 else ["sand", "rigid"]
+        grounds = default if self.on is None else [name.strip() for name in self.on.split(",")]
+        jobs = {}
+        for group in runs.values():
+            for run in group:
+                for name in grounds:
+                    if evaluate.settings_on(Folder(run).plan(), name) is None:
+                        raise RftsimError(f"{name} has no density, which the law of {run} needs")
+                    jobs[f"{run} on {name}"] = (run, name, self.episodes, self.seed, self.threads, self.baseline)
+        with needing("ray"), Progress(console=Console(stderr=True), transient=True, disable=self.json) as bar:
+            task = bar.add_task("episodes", total=len(jobs))
+            found = spread(evaluate.score, jobs, self.ray, lambda name, scores: bar.advance(task))
+        scores = {
+            group: evaluate.pooled([one for run in own for name in grounds for one in found[f"{run} on {name}"]])
+            for group, own in runs.items()
+        }
+        names = {group: _name(plans[group], group, len(own)) for group, own in runs.items()}
+        if self.plot:
+            from rftsim.plots import plot_returns
+
+            with replacing(self.plot) as temporary:
+                plot_returns({names[group]: own for group, own in scores.items()}, temporary)
+        self._print(scores, names, grounds)
+
+    def _print(self, scores: "dict[Path, list[Score]]", names: dict[Path, str], grounds: list[str]) -> None:
+        if self.json:
+            print_json({str(group): [_report(one) for one in own] for group, own in scores.items()})
+            return
+        if len(scores) == 1:
+            ((group, own),) = scores.items()
+            title, rows = names[group], _grid(own, self.baseline)
+        else:
+            title, rows = "return", _transfer(scores, names, grounds)
+        if self.markdown:
+            lines = [" | ".join(row) for row in rows]
+            lines.insert(1, " | ".join(["---"] + ["---:"] * (len(rows[0]) - 1)))
+            print("\n".join(f"| {line} |" for line in lines) + f"\n\n    {self._command()}")
+            return
+        table = Table(title=title, title_justify="left")
+        for k, name in enumerate(rows[0]):
+            table.add_column(escape(name), justify="right" if k else "left")
+        for row in rows[1:]:
+            table.add_row(*row)
+        Console().print(table)
+        if self.plot:
+            Console().print(f"wrote {self.plot}", highlight=False)
+
+    def _command(self) -> str:
+        chosen = f" --on {self.on!r}" if self.on and " " in self.on else f" --on {self.on}" if self.on else ""
+        more = (" --baseline" if self.baseline else "") + (
+            f" --episodes {self.episodes}" if self.episodes != 20 else ""
+        )
+        return f"rftsim evaluate {' '.join(map(str, self.runs))}{chosen}{more} --markdown"
+
+
+def _name(plan: Any, group: Path, runs: int) -> str:
+    seeds = f", {runs} runs" if runs > 1 else ""
+    return f"{plan.task} trained on {plan.settings['ground']} ({group.name}{seeds})"
+
+
+def _spread(one: "Score") -> str:
+    return f"{one.mean('r'):.3g} ± {one.std('r'):.2g}"
+
+
+def _grid(scores: "list[Score]", baseline: bool) -> list[list[str]]:
+    rows = [["ground", "return", *NUMBERS.values(), *(["random", "best open loop"] if baseline else [])]]
+    for one in scores:
+        if one.actor != "policy":
+            continue
+        numbers = [100.0 * one.mean(name) if name == "early" else one.mean(name) for name in NUMBERS]
+        others = {other.actor: other for other in scores if other.ground == one.ground}
+        more = [_other(others.get(name)) for name in ("random", "open loop")] if baseline else []
+        cells = ["-" if math.isnan(number) else f"{number:.3g}" for number in numbers]
+        rows.append([one.ground, _spread(one), *cells, *more])
+    return rows
+
+
+def _other(one: "Score | None") -> str:
+    if one is None:
+        return "-"
+    return f"{one.mean('r'):.3g}" + (f" at {one.which}" if one.which else "")
+
+
+def _transfer(scores: "dict[Path, list[Score]]", names: dict[Path, str], grounds: list[str]) -> list[list[str]]:
+    actors = dict.fromkeys(one.actor for own in scores.values() for one in own)
+    rows = [["return", *(f"on {name}" for name in grounds)]]
+    for group, own in scores.items():
+        for actor in actors:
+            by_ground = {one.ground: one for one in own if one.actor == actor}
+            name = names[group] if actor == "policy" else f"{names[group].split(' ')[0]}, {actor}"
+            rows.append([name, *(_spread(by_ground[g]) if g in by_ground else "-" for g in grounds)])
+    return rows
+
+
+def _report(one: "Score") -> dict[str, Any]:
+    return {
+        "ground": one.ground,
+        "actor": one.actor,
+        "which": one.which,
+        "return_mean": one.mean("r"),
+        "return_std": one.std("r"),
+        "speed_m_s": one.mean("speed"),
+        "cost_of_transport": one.mean("cost_of_transport"),
+        "ended_early": one.mean("early"),
+        "episodes": one.episodes,
+    }
