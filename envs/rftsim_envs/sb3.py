@@ -31,6 +31,7 @@ class SandVecEnv(VecEnv):
 
     Attributes:
         rngs: The generators of the simulations' episodes.
+        outcome: What the last step gave, before new episodes began.
         measured: Names of the numbers in `episode`, once there was a step.
 
     Raises:
@@ -71,7 +72,7 @@ class SandVecEnv(VecEnv):
 
     def step_wait(self) -> VecEnvStepReturn:
         """Go on by one control step."""
-        out = self.episodes.step(self._action)
+        out = self.outcome = self.episodes.step(self._action)
         self._tally.add(out)
         observation, done = out.observation, out.terminated | out.truncated
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]

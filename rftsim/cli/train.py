@@ -6,7 +6,7 @@ import signal
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import tyro
 from rich.console import Console
@@ -15,6 +15,11 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, Ti
 from rftsim.cli.extra import needing
 from rftsim.cli.inspect import Settings, settings
 from rftsim.cli.output import print_json
+from rftsim.errors import RftsimError
+
+if TYPE_CHECKING:
+    from rftsim_envs.training.folder import Plan
+    from rftsim_envs.training.ppo import Trained
 
 
 @dataclasses.dataclass(frozen=True)
@@ -47,30 +52,82 @@ class Train:
     """Threads of the simulations; 0 for as many as there are processors."""
     tensorboard: bool = False
     """Write for TensorBoard, too, under OUT/tensorboard."""
+    seeds: str | None = None
+    """Several runs, 0,1,2: each in OUT/seed-N, one after the other or on Ray."""
+    vary: Settings = ()
+    """Several runs, in OUT/key=value/seed-N: settings with each value that they take, ground=sand ground=rigid."""
+    ray: str | None = None
+    """Train the runs as tasks on Ray: `local`, or the address of a cluster that shares OUT. A run whose worker dies goes
+    on from its checkpoint; finished ones are not repeated."""
     json: bool = False
     """Print JSON instead of progress."""
 
     def __call__(self, warnings: Callable[[], list[str]]) -> None:
         """Train and report."""
         with needing("train"):
-            from rftsim_envs.training import ppo
+            from rftsim_envs.training.campaign import make_plans
             from rftsim_envs.training.folder import make_plan
         changes: dict[str, Any] = settings(self.hyper)
         changes |= {"steps": self.steps} if self.steps is not None else {}
         changes |= {"n_envs": self.envs} if self.envs is not None else {}
-        plan = make_plan(self.env, settings(self.set), changes, seed=self.seed, algo=self.algo)
-        with interruptible() as stop, showing(plan.training.steps, self.json) as report:
-            trained = ppo.train(
-                plan, self.out, threads=self.threads, tensorboard=self.tensorboard, report=report, stop=stop
-            )
-        if self.json:
-            print_json({"folder": str(self.out), **trained._asdict()})
+        given = settings(self.set)
+        if self.seeds is None and not self.vary and self.ray is None:
+            plans = {"": make_plan(self.env, given, changes, seed=self.seed, algo=self.algo)}
         else:
-            Console().print(
-                _said(trained.steps, trained.began, trained.done, self.out), highlight=False, soft_wrap=True
-            )
-        if not trained.done:
+            seeds = _seeds(self.seeds or str(self.seed))
+            plans = make_plans(self.env, given, changes, seeds=seeds, vary=_values(self.vary), algo=self.algo)
+        found = self._train_here(plans) if self.ray is None else self._train_on_ray(plans, self.ray)
+        if self.json:
+            print_json({str(self.out / name): trained._asdict() for name, trained in found.items()})
+        else:
+            for name, one in found.items():
+                Console().print(_said(*one, self.out / name), highlight=False, soft_wrap=True)
+        if not all(one.done for one in found.values()):
             sys.exit(130)
+
+    def _train_here(self, plans: "dict[str, Plan]") -> "dict[str, Trained]":
+        from rftsim_envs.training.ppo import train
+
+        found = {}
+        with interruptible() as stop:
+            for name, plan in plans.items():
+                with showing(name or plan.task, plan.training.steps, self.json) as report:
+                    found[name] = train(
+                        plan,
+                        self.out / name,
+                        threads=self.threads,
+                        tensorboard=self.tensorboard,
+                        report=report,
+                        stop=stop,
+                    )
+                if stop():
+                    break
+        return found
+
+    def _train_on_ray(self, plans: "dict[str, Plan]", address: str) -> "dict[str, Trained]":
+        if self.tensorboard or self.threads:
+            raise RftsimError("runs on Ray have one thread each and do not write for TensorBoard")
+        from rftsim_envs.training.campaign import train_all
+
+        with needing("ray"), Progress(console=Console(stderr=True), disable=self.json) as bar:
+            task = bar.add_task("runs", total=len(plans))
+            return train_all(plans, self.out, address, lambda name, trained: bar.advance(task))
+
+
+def _seeds(text: str) -> list[int]:
+    try:
+        return [int(word) for word in text.split(",")]
+    except ValueError:
+        raise RftsimError(f"--seeds takes whole numbers with commas between them, not {text!r}") from None
+
+
+def _values(groups: Settings) -> dict[str, list[str]]:
+    """The values of each key in `key=value` words, in which a key may come again."""
+    found: dict[str, list[str]] = {}
+    for word in (word for group in groups for word in group):
+        ((key, value),) = settings(((word,),)).items()
+        found.setdefault(key, []).append(value)
+    return found
 
 
 def _said(steps: int, began: int, done: bool, out: Path) -> str:
@@ -100,9 +157,10 @@ def interruptible() -> Iterator[Callable[[], bool]]:
 
 
 @contextlib.contextmanager
-def showing(steps: int, silent: bool) -> Iterator[Callable[[Mapping[str, Any]], None]]:
+def showing(name: str, steps: int, silent: bool) -> Iterator[Callable[[Mapping[str, Any]], None]]:
     """A bar of the training's progress."""
     columns = (
+        TextColumn("{task.description}"),
         TextColumn("{task.completed:,} of {task.total:,} steps"),
         BarColumn(),
         TextColumn("return {task.fields[score]}  {task.fields[pace]} steps/s"),
@@ -110,7 +168,7 @@ def showing(steps: int, silent: bool) -> Iterator[Callable[[Mapping[str, Any]], 
         TimeRemainingColumn(elapsed_when_finished=True),
     )
     with Progress(*columns, console=Console(stderr=True), disable=silent) as bar:
-        task = bar.add_task("training", total=steps, score="-", pace="-")
+        task = bar.add_task(name, total=steps, score="-", pace="-")
 
         def report(row: Mapping[str, Any]) -> None:
             score = f"{float(row['return']):.3g}" if row["return"] else "-"

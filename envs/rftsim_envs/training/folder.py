@@ -158,8 +158,11 @@ class Folder:
         with contextlib.ExitStack() as stack:
             try:
                 self.path.mkdir(parents=True, exist_ok=True)
-                lock = stack.enter_context((self.path / ".lock").open("w"))
+                lock = stack.enter_context((self.path / ".lock").open("a"))
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                lock.truncate(0)
+                lock.write(str(os.getpid()))
+                lock.flush()
             except BlockingIOError:
                 raise TrainingError(f"another process trains in {self.path}") from None
             except OSError as error:

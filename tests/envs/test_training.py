@@ -1,0 +1,383 @@
+"""Training as a person uses it: what is written, how it goes on, what it refuses; play, evaluate, and recordings."""
+
+import errno
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+pytest.importorskip("stable_baselines3")
+
+from rftsim_envs import tasks, watch
+from rftsim_envs.env import SandEnv
+from rftsim_envs.recipe import Training, TrainingError
+from rftsim_envs.sb3 import SandVecEnv
+from rftsim_envs.training import actors, evaluate, folder, ppo
+from rftsim_envs.training.folder import Folder, make_plan
+from stable_baselines3 import PPO
+from stable_baselines3.common.vec_env import DummyVecEnv
+
+import rftsim
+from rftsim.cli import main
+
+TASK = "FourFlapRunner"
+SHORT = {"duration": 0.3}
+TINY = {"steps": 500, "n_envs": 4, "n_steps": 32, "batch_size": 32, "n_epochs": 2, "layers": (8,)}
+
+
+def call(capsys, *arguments):
+    """Exit code, standard output and standard error of one command."""
+    code = 0
+    try:
+        main([str(argument) for argument in arguments])
+    except SystemExit as end:
+        code = end.code
+    return code, *capsys.readouterr()
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    """The folder of a finished run."""
+    path = tmp_path_factory.mktemp("run")
+    assert ppo.train(make_plan(TASK, SHORT, TINY), path) == (500, 0, True)
+    return path
+
+
+def parameters(path):
+    return PPO.load(path, device="cpu").get_parameters()["policy"]
+
+
+def equal(one, other):
+    return all(np.array_equal(one[name], other[name]) for name in one)
+
+
+def test_side_by_side_is_one_by_one():
+    def episodes(env):
+        env.seed(3)
+        actions = np.random.default_rng(0).uniform(-1.5, 1.5, (70, 3, 1)).astype(np.float32)
+        return [env.reset(), *(env.step(action.clip(-1, 1)) for action in actions)]
+
+    one = DummyVecEnv([lambda: gym.make(f"rftsim/{TASK}-v0", max_episode_steps=None, **SHORT)] * 3)
+    first, *steps = episodes(one)
+    other_first, *other_steps = episodes(SandVecEnv(TASK, 3, **SHORT))
+    np.testing.assert_array_equal(first, other_first)
+    ended = 0
+    for (seen, reward, done, infos), other in zip(steps, other_steps, strict=True):
+        for mine, theirs in zip((seen, reward, done), other[:3], strict=True):
+            np.testing.assert_array_equal(mine, theirs)
+        for info, told in zip(infos, other[3], strict=True):
+            assert ("terminal_observation" in info) == ("terminal_observation" in told)
+            if "terminal_observation" in told:
+                ended += 1
+                np.testing.assert_array_equal(info["terminal_observation"], told["terminal_observation"])
+                assert told["TimeLimit.truncated"] is info["TimeLimit.truncated"] is True
+                assert told["episode"]["l"] == 30
+    assert ended == 6
+    rewards = np.sum([step[1] for step in steps[:30]], axis=0)
+    np.testing.assert_allclose([info["episode"]["r"] for info in other_steps[29][3]], rewards, rtol=1e-6)
+
+
+def test_a_run_says_what_was_asked_and_how_it_went(finished):
+    config = json.loads((finished / "config.json").read_text())
+    assert config["env"] == f"rftsim/{TASK}-v0"
+    assert config["done"] is True
+    assert config["settings"]["duration"] == 0.3
+    assert config["training"]["layers"] == [8]
+    assert set(config["versions"]) == {"rftsim", "mujoco", "stable-baselines3", "torch", "numpy"}
+    rows = folder.read_progress(finished / "progress.csv")
+    assert [int(row["update"]) for row in rows] == [1, 2, 3, 4]
+    assert int(rows[-1]["steps"]) == 500
+    assert float(rows[-1]["length"]) == 30
+    assert float(rows[-1]["return"]) == pytest.approx(
+        float(rows[-1]["reward/speed"]) + float(rows[-1]["reward/power"]), rel=1e-4
+    )
+    assert PPO.load(finished / "policy.zip", device="cpu").num_timesteps == 500
+
+
+def test_a_seed_gives_one_policy(finished, tmp_path):
+    ppo.train(make_plan(TASK, SHORT, TINY), tmp_path / "again", threads=1)
+    ppo.train(make_plan(TASK, SHORT, TINY, seed=1), tmp_path / "other")
+    assert equal(parameters(finished / "policy.zip"), parameters(tmp_path / "again" / "policy.zip"))
+    assert not equal(parameters(finished / "policy.zip"), parameters(tmp_path / "other" / "policy.zip"))
+
+
+def test_a_stopped_run_goes_on_from_its_last_update(tmp_path):
+    plan, calls = make_plan(TASK, SHORT, TINY), []
+
+    def stop():
+        calls.append(1)
+        return len(calls) == 40  # in the second of four updates
+
+    assert ppo.train(plan, tmp_path, stop=stop) == (124, 0, False)
+    kept = PPO.load(tmp_path / "checkpoint.zip", device="cpu").get_parameters()
+    assert kept["policy.optimizer"]["state"][0]["step"] == 2 * 4  # epochs, batches
+    assert ppo.train(plan, tmp_path) == (500, 124, True)
+    assert [int(row["steps"]) for row in folder.read_progress(tmp_path / "progress.csv")] == [124, 248, 372, 500]
+
+
+KILLED = f"""
+import sys
+from rftsim_envs.training import ppo
+from rftsim_envs.training.folder import make_plan
+ppo.EVERY_STEPS = 200
+plan = make_plan({TASK!r}, {SHORT!r}, {TINY | {"steps": 2000}!r})
+ppo.train(plan, sys.argv[1], report=lambda row: print(row["steps"], flush=True))
+"""
+
+
+def test_a_killed_run_goes_on_from_its_checkpoint_and_ends_with_the_steps_asked_for(tmp_path):
+    with subprocess.Popen([sys.executable, "-c", KILLED, tmp_path], stdout=subprocess.PIPE, text=True) as process:
+        for line in process.stdout:
+            if int(line) > 800:
+                process.kill()
+    rows = folder.read_progress(tmp_path / "progress.csv")
+    assert not Folder(tmp_path).done
+    trained = ppo.train(make_plan(TASK, SHORT, TINY | {"steps": 2000}), tmp_path)
+    assert trained.steps == 2000
+    assert trained.done
+    assert 0 <= int(rows[-1]["steps"]) - trained.began <= 400  # a checkpoint's distance, and the update in hand
+    again = folder.read_progress(tmp_path / "progress.csv")
+    assert [int(row["update"]) for row in again] == list(range(1, len(again) + 1))
+    assert int(again[-1]["steps"]) == 2000
+    assert PPO.load(tmp_path / "policy.zip", device="cpu").num_timesteps == 2000
+
+
+def test_the_command_resumes_refuses_and_says_that_it_is_finished(finished, capsys):
+    arguments = ["train", TASK, "--out", finished, "--set", "duration=0.3", "--envs", 4, "--steps", 500]
+    hyper = ["--hyper", "n_steps=32", "batch_size=32", "n_epochs=2", "layers=8"]
+    code, out, _ = call(capsys, *arguments, *hyper)
+    assert (code, "is finished: 500 steps" in out) == (0, True)
+    code, _, err = call(capsys, *arguments, *hyper, "--seed", 3)
+    assert code == 2
+    assert "seed is 0 there and 3 here" in err
+    code, _, err = call(capsys, *arguments, *hyper, "--set", "strength=0.5,2", "--hyper", "gamma=0.9")
+    assert code == 2
+    assert "settings.strength is [1.0, 1.0] there and [0.5, 2.0] here" in err
+    assert "training.gamma is 0.99 there and 0.9 here" in err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["Frog"], "tasks are FourFlapRunner"),
+        ([TASK, "--set", "colour=3"], "has no setting 'colour'"),
+        ([TASK, "--hyper", "speed=3"], "it has steps, n_envs"),
+        ([TASK, "--hyper", "gamma=2"], "gamma must be"),
+        ([TASK, "--steps", "0"], "steps must be positive"),
+        ([TASK, "--seeds", "a"], "whole numbers"),
+    ],
+)
+def test_what_cannot_be_is_refused_before_anything_is_written(arguments, words, tmp_path, capsys):
+    code, _, err = call(capsys, "train", *arguments, "--out", tmp_path / "new")
+    assert code == 2
+    assert words in " ".join(err.split())
+    assert not (tmp_path / "new").exists()
+
+
+def test_a_folder_that_cannot_be_written_is_refused_before_training(tmp_path, capsys):
+    places = ["/sys/rftsim"]
+    (tmp_path / "file").write_text("")
+    places.append(tmp_path / "file")
+    if os.geteuid():
+        (tmp_path / "mine").mkdir(mode=0o500)
+        places.append(tmp_path / "mine")
+    for place in places:
+        code, _, err = call(capsys, "train", TASK, "--out", place)
+        assert code == 2
+        assert f"cannot write to {place}" in " ".join(err.split())
+
+
+def test_a_full_disk_leaves_the_last_checkpoint_whole(tmp_path, capsys, monkeypatch):
+    plan = make_plan(TASK, SHORT, TINY)
+    monkeypatch.setattr(ppo, "EVERY_STEPS", 1)
+    written = []
+
+    def fsync(handle):
+        written.append(handle)
+        if len(written) > 5:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with monkeypatch.context() as full:
+        full.setattr(os, "fsync", fsync)
+        with pytest.raises(TrainingError, match=r"No space left on device.*at 248 steps is whole"):
+            ppo.train(plan, tmp_path)
+        assert {path.name for path in tmp_path.iterdir()} == {".lock", "config.json", "progress.csv", "checkpoint.zip"}
+        full.setattr(os, "fsync", lambda handle: (_ for _ in ()).throw(OSError(errno.ENOSPC, "No space left")))
+        with pytest.raises(TrainingError, match="No space left"):
+            ppo.train(plan, tmp_path / "new")
+    assert ppo.train(plan, tmp_path) == (500, 248, True)
+
+
+def test_two_processes_do_not_train_in_one_folder(tmp_path):
+    plan = make_plan(TASK, SHORT, TINY)
+    with (
+        Folder(tmp_path).opened(plan),
+        pytest.raises(TrainingError, match="another process"),
+        Folder(tmp_path).opened(plan),
+    ):
+        pass
+
+
+@pytest.mark.parametrize(("steps", "n_envs", "n_steps"), [(1, 1, 1), (1000, 64, 128), (100_000, 64, 128), (64, 64, 1)])
+def test_updates_make_the_steps_asked_for(steps, n_envs, n_steps):
+    updates = Training(steps=steps, n_envs=n_envs, n_steps=n_steps).updates()
+    assert 0 <= sum(updates) * n_envs - steps < n_envs
+    assert max(updates) <= n_steps
+    assert max(updates) - min(updates) <= 1
+
+
+def test_a_policy_is_played(finished, capsys, tmp_path):
+    arguments = ("play", finished, "--episodes", 2, "--json")
+    report = json.loads(call(capsys, *arguments)[1])
+    assert report == json.loads(call(capsys, *arguments)[1])
+    assert report["actions"] == "policy"
+    env = SandEnv(TASK, **SHORT)
+    seen, _ = env.reset(seed=0)
+    model, total, done = PPO.load(finished / "policy.zip", device="cpu"), 0.0, False
+    while not done:
+        seen, reward, terminated, truncated, _ = env.step(model.predict(seen, deterministic=True)[0])
+        total, done = total + reward, terminated or truncated
+    assert report["episodes"][0]["r"] == pytest.approx(total, rel=1e-12)
+    code, out, _ = call(capsys, "play", TASK, "--actions", "zero", "--seconds", 0.1, "--set", "ground=rigid")
+    assert code == 0
+    assert "return" in out
+    code, _, err = call(capsys, "play", TASK, "--actions", "policy")
+    assert (code, "it has no policy" in " ".join(err.split())) == (2, True)
+
+
+def test_a_recording_reads_back_the_wrench(finished, tmp_path, capsys):
+    pytest.importorskip("rerun")
+    path = tmp_path / "played.rrd"
+    assert call(capsys, "play", finished, "--record", path)[0] == 0
+    force, motion = read(path, "/sand/force"), read(path, "/motion/speed")
+    assert len(motion) == 30
+    env = SandEnv(TASK, **SHORT)
+    env.reset(seed=0)
+    actor, wheel = actors.trained(Folder(finished))(env.episodes), env.model.body("wheel").id
+    seen = env.episodes.observation()
+    for k in range(30):
+        seen, _, _, _, info = env.step(actor(np.reshape(seen, (1, -1)), 0.0)[0])
+        np.testing.assert_array_equal(force[k], rftsim.wrenches(env.model, env.data).force[wheel])
+        assert motion[k] == info["speed"]
+    assert np.linalg.norm(force, axis=1).max() > 10.0
+
+
+def read(path, start):
+    """The values under an entity, in time's order, (n, ...)."""
+    from rerun.chunk import RrdReader
+
+    found = []
+    for chunk in RrdReader(path).stream().to_chunks():
+        if chunk.entity_path.startswith(start):
+            batch = chunk.to_record_batch()
+            if "Scalars:scalars" in batch.schema.names:  # else how it is drawn
+                found += batch.column("Scalars:scalars").to_pylist()
+    values = np.array(found)
+    return values[:, 0] if values.shape[1] == 1 else values
+
+
+def test_one_of_many_is_recorded_as_one_alone(tmp_path):
+    pytest.importorskip("rerun")
+    many, one = SandVecEnv(TASK, 3, **SHORT), SandEnv(TASK, **SHORT)
+    many.seed(5)
+    many.reset()
+    one.reset(seed=6)
+    action = np.full((3, 1), 0.5, np.float32)
+    with (
+        watch.Watch(many.episodes, tmp_path / "many.rrd", i=1) as seen,
+        watch.Watch(one.episodes, tmp_path / "one.rrd") as other,
+    ):
+        for _ in range(10):
+            many.step(action)
+            seen.log(many.outcome.info)
+            other.log(one.step(action[1])[4])
+    for name in ("/motion/speed", "/reward/power", "/slip/slip", "/power/power"):
+        np.testing.assert_array_equal(read(tmp_path / "many.rrd", name), read(tmp_path / "one.rrd", name))
+    assert np.ptp(read(tmp_path / "one.rrd", "/motion/speed")) > 0.0
+
+
+def test_a_policy_is_scored_on_grounds(finished, tmp_path, capsys):
+    arguments = ("evaluate", finished, "--on", "sand,rigid", "--episodes", 2, "--baseline", "--json")
+    report = json.loads(call(capsys, *arguments, "--plot", tmp_path / "scores.png")[1])
+    assert [(one["ground"], one["actor"]) for one in report[str(finished)]] == [
+        (ground, actor) for ground in ("sand", "rigid") for actor in ("policy", "random", "open loop")
+    ]
+    assert (tmp_path / "scores.png").stat().st_size > 10_000
+    played = json.loads(call(capsys, "play", finished, "--seed", 10_001, "--json")[1])["episodes"][0]
+    scored = report[str(finished)][0]["episodes"][1]
+    assert scored["r"] == pytest.approx(played["r"], rel=1e-6)  # actions of a batch differ in their last bits
+    for one in report[str(finished)]:
+        assert one["ended_early"] == 0.0
+        assert one["which"].endswith("rad/s") == (one["actor"] == "open loop")
+
+
+def test_several_runs_make_a_table_of_transfer(finished, tmp_path, capsys):
+    ppo.train(make_plan(TASK, SHORT | {"ground": "rigid"}, TINY), tmp_path / "rigid" / "seed-0")
+    code, out, _ = call(capsys, "evaluate", finished, tmp_path / "rigid", "--episodes", 1, "--markdown")
+    head, _, *rows = (line for line in out.splitlines() if line.startswith("|"))
+    assert code == 0
+    assert head == "| return | on sand | on rigid |"
+    assert ["trained on sand" in rows[0], "trained on rigid" in rows[1]] == [True, True]
+    assert f"    rftsim evaluate {finished} {tmp_path / 'rigid'} --episodes 1 --markdown" in out
+    code, _, err = call(capsys, "evaluate", finished, "--on", "mud")
+    assert (code, "grounds are as trained, sand" in " ".join(err.split())) == (2, True)
+    code, _, err = call(capsys, "evaluate", tmp_path / "nothing")
+    assert (code, "holds no training run" in " ".join(err.split())) == (2, True)
+
+
+def test_the_grid_has_each_ground_once():
+    found = evaluate.grid(make_plan(TASK))
+    assert "as trained" in found
+    assert "poppy-seeds" not in found  # that is what the runner is trained on
+    assert "medium-sand" not in found  # it has no density
+    assert "rigid" in found
+
+
+@pytest.mark.parametrize("name", tasks.TASKS)
+def test_drives_that_see_nothing_are_actions(name):
+    task = tasks.make(name, {})
+    env = SandEnv(name)
+    for drive in task.open_loops().values():
+        for time_ in (0.0, 1.23):
+            action = drive(time_)
+            assert action.shape == (env.task.naction,)
+            assert np.abs(action).max() <= 1.0
+
+
+@pytest.mark.slow
+def test_on_ray_each_run_ends_once_though_a_worker_dies(tmp_path, capsys):
+    pytest.importorskip("ray")
+    arguments = ["train", TASK, "--out", tmp_path, "--set", "duration=0.3", "--envs", 4, "--steps", 4000]
+    arguments += ["--hyper", "n_steps=32", "batch_size=32", "--seeds", "0,1,2,3,4,5,6,7", "--ray", "local", "--json"]
+    killed = []
+
+    def kill():
+        victim = Folder(tmp_path / "seed-1")
+        while not (victim.progress.is_file() and len(victim.progress.read_text().splitlines()) > 3):
+            time.sleep(0.05)
+        killed.append(int((victim.path / ".lock").read_text()))
+        os.kill(killed[0], signal.SIGKILL)
+
+    killer = threading.Thread(target=kill, daemon=True)
+    killer.start()
+    code, out, _ = call(capsys, *arguments)
+    killer.join(1.0)
+    assert code == 0
+    assert killed[0] != os.getpid()
+    report = json.loads(out)
+    assert list(report) == [str(tmp_path / f"seed-{k}") for k in range(8)]
+    assert all(one["steps"] == 4000 and one["done"] for one in report.values())
+    for k in range(8):
+        rows = folder.read_progress(tmp_path / f"seed-{k}" / "progress.csv")
+        assert [int(row["update"]) for row in rows] == list(range(1, 33))
+        assert int((tmp_path / f"seed-{k}" / ".lock").read_text()) != killed[0] or k != 1
+    before = {path: path.stat().st_mtime_ns for path in tmp_path.glob("*/policy.zip")}
+    assert call(capsys, *arguments)[0] == 0
+    assert before == {path: path.stat().st_mtime_ns for path in tmp_path.glob("*/policy.zip")}
