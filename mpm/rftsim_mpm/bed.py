@@ -32,10 +32,6 @@ class Particles:
     """Logarithm of the packing fraction of the dense state, (n,) [-]."""
     strain: Array
     """Equivalent plastic shear strain, (n,) [-]."""
-    anchor: Array
-    """Where the particle sticks to a body, in its frame, (n, dim) [m]."""
-    held: NDArray[np.int64]
-    """Number of that body, from 1, or 0, (n,)."""
     number: NDArray[np.int64]
     """What the particle was before any sorting, (n,)."""
 
@@ -136,8 +132,6 @@ def level_bed(
         theta=theta,
         theta_d=theta_d,
         strain=np.zeros(n),
-        anchor=np.zeros((n, dim)),
-        held=np.zeros(n, np.int64),
         number=np.arange(n),
     )
 

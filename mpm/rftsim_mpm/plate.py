@@ -18,7 +18,7 @@ from rftsim_mpm.body import Body, plane_rotation, turned
 from rftsim_mpm.errors import MpmError
 from rftsim_mpm.material import Material, stiffness
 from rftsim_mpm.reading import History, Log, limit, read
-from rftsim_mpm.shapes import box
+from rftsim_mpm.shapes import Surface, box, patches
 from rftsim_mpm.simulation import Simulation
 
 Array = NDArray[np.float64]
@@ -221,7 +221,7 @@ def measure(plate: Plate, watch: Watch | None = None, buried: float = BURIED) ->
     window = plate.window
     first = sim.bodies[0].position.copy()
     descent = -float(plate.direction[-1])
-    log, profile = Log(), Profile(sim.bodies[0], plate.dx)
+    log, traction, steps = Log(), np.zeros_like(sim.traction[0]), 0
     began, travel = time.perf_counter(), 0.0
     while travel < approach + window:
         sim.step()
@@ -229,7 +229,8 @@ def measure(plate: Plate, watch: Watch | None = None, buried: float = BURIED) ->
         depth = plate.z + (travel - approach) * descent
         log.add(sim.time, travel, depth, sim.force[0] / share, sim.moment[0] / share)
         if abs(travel - approach) <= window:
-            profile.add(sim.contacts[0].place, sim.contacts[0].force)
+            traction += sim.traction[0]
+            steps += 1
         if watch is not None:
             watch(sim, min(1.0, travel / (approach + window)))
     history = log.history(plate.dim)
@@ -241,53 +242,24 @@ def measure(plate: Plate, watch: Watch | None = None, buried: float = BURIED) ->
         depth=plate.z,
         noise=noise,
         history=history,
-        profile=profile.mean(),
+        profile=profile(sim.bodies[0], sim.surfaces[0], traction / steps, plate.dx),
         particles=len(sim.particles),
         steps=sim.steps,
         seconds=time.perf_counter() - began,
     )
 
 
-class Profile:
-    """Mean stress on patches of a body's surface, about a cell long each."""
+def profile(body: Body, surface: Surface, traction: Array, dx: float) -> tuple[Array, Array]:
+    """Stress on patches of a body's surface, about a cell long each, from that on the points where it touches.
 
-    def __init__(self, body: Body, dx: float) -> None:
-        self._places, self._areas = patches(body.shape.vertices, body.shape.faces, dx)
-        self._sum, self._count = np.zeros_like(self._places), 0
-
-    def add(self, place: Array, force: Array) -> None:
-        """One step's contacts, each given to the nearest patch."""
-        self._count += 1
-        if len(place):
-            nearest = ((place[:, None, :] - self._places[None]) ** 2).sum(axis=2).argmin(axis=1)
-            np.add.at(self._sum, nearest, force)
-
-    def mean(self) -> tuple[Array, Array]:
-        """Centres of the patches [m] and mean stress on each [Pa], in the body's frame."""
-        return self._places, self._sum / self._areas[:, None] / max(self._count, 1)
-
-
-def patches(vertices: Array, faces: NDArray[np.int64], size: float) -> tuple[Array, Array]:
-    """Cut edges or triangles into pieces of about `size` [m]: their centres and their lengths or areas."""
-    places: list[Array] = []
-    areas: list[float] = []
-    for corners in vertices[faces]:
-        longest = max(float(np.linalg.norm(corners[i] - corners[i - 1])) for i in range(len(corners)))
-        n = max(1, math.ceil(longest / size))
-        if len(corners) == 2:
-            share = (np.arange(n) + 0.5) / n
-            places += list(corners[0] + share[:, None] * (corners[1] - corners[0]))
-            areas += [longest / n] * n
-            continue
-        a, b, c = corners
-        area = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a))) / n**2
-        for i in range(n):
-            for j in range(n - i):
-                places.append(a + (b - a) * ((i + 1 / 3) / n) + (c - a) * ((j + 1 / 3) / n))
-                if j < n - i - 1:
-                    places.append(a + (b - a) * ((i + 2 / 3) / n) + (c - a) * ((j + 2 / 3) / n))
-        areas += [area] * n**2
-    return np.array(places), np.array(areas)
+    Returns:
+        Centres of the patches [m] and stress of the sand on each [Pa], in the body's frame.
+    """
+    places, areas, _ = patches(body.shape.vertices[body.shape.faces], dx)
+    force = np.zeros_like(places)
+    nearest = ((surface.points[:, None, :] - places[None]) ** 2).sum(axis=2).argmin(axis=1)
+    np.add.at(force, nearest, -surface.areas[:, None] * traction)
+    return places, force / areas[:, None]
 
 
 def spread(mu: float) -> float:

@@ -1,13 +1,13 @@
-"""Rigid shapes: polygons in the x-z plane and closed meshes, each with the signed distance that contact needs."""
+"""Rigid shapes: polygons in the x-z plane and closed meshes: their distances, and points all over them."""
 
 import dataclasses
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rftsim_mpm.contact import Distance
 from rftsim_mpm.errors import MpmError
 
 Array = NDArray[np.float64]
@@ -22,7 +22,6 @@ class Shape:
     """Corners, (n, dim) [m]; of a polygon counter-clockwise with x to the right and z up."""
     faces: NDArray[np.int64]
     """Edges (n, 2) of a polygon, outward triangles (n, 3) of a mesh."""
-    convex: bool
 
     @property
     def dim(self) -> int:
@@ -52,25 +51,69 @@ class Shape:
         heights = np.einsum("fd,fd->f", self.vertices[self.faces].mean(axis=1), self.normals)
         return float(heights @ self.areas) / self.dim
 
-    def distance(self, spacing: float) -> Distance:
-        """What contact needs; the distances of a shape that is not convex are tabulated at a spacing [m]."""
-        none = np.zeros((0, self.dim + 1)), np.zeros((0, 0, 0)), np.zeros(3)
-        if self.convex:
-            offsets = np.einsum("fd,fd->f", self.normals, self.vertices[self.faces[:, 0]])
-            planes = np.unique(np.column_stack([self.normals, offsets]).round(14), axis=0)
-            return Distance(np.ascontiguousarray(planes), none[1], none[2], 1.0, self.radius)
-        low, high = self.vertices.min(axis=0) - 2.0 * spacing, self.vertices.max(axis=0) + 2.0 * spacing
-        axes = [np.arange(a, b + spacing, spacing) for a, b in zip(low, high, strict=True)]
-        if math.prod(map(len, axes)) * len(self.faces) > 3e10:
-            raise MpmError(
-                f"{self.name} has {len(self.faces)} faces, too many to tabulate every {spacing:g} m; simplify it"
-            )
-        points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+    def distances(self, points: Array) -> Array:
+        """Signed distances of points, (n, dim), from the surface, negative inside [m]; infinite where far outside."""
+        low, high = self.vertices.min(axis=0), self.vertices.max(axis=0)
+        near = ((points >= low) & (points <= high)).all(axis=1)
+        found = np.full(len(points), np.inf)
         measure = _polygon_distances if self.dim == 2 else _mesh_distances
-        values = measure(points.reshape(-1, self.dim), self.vertices[self.faces]).reshape(points.shape[:-1])
-        table = values[:, None, :] if self.dim == 2 else values
-        corner = np.array([low[0], 0.0, low[1]]) if self.dim == 2 else low
-        return Distance(none[0], np.ascontiguousarray(table), corner, 1.0 / spacing, self.radius)
+        found[near] = measure(np.ascontiguousarray(points[near]), self.vertices[self.faces])
+        return found
+
+    def surface(self, spacing: float, inset: float = 0.0) -> "Surface":
+        """Points about a `spacing` [m] apart all over the surface that lies `inset` [m] inside this one."""
+        points, areas, face = patches(self.vertices[self.faces], spacing)
+        normals = self.normals[face]
+        points = points - inset * normals
+        keep = self.distances(points) <= -inset * (1.0 - 1e-6) if inset else np.ones(len(points), bool)
+        return Surface(*(np.ascontiguousarray(part[keep]) for part in (points, normals, areas)))
+
+
+class Surface(NamedTuple):
+    """A body's surface as points, in its own frame."""
+
+    points: Array
+    """(n, dim) [m]."""
+    normals: Array
+    """Outward, (n, dim)."""
+    areas: Array
+    """What each stands for, (n,) [m^2, in the plane m]."""
+
+
+def patches(faces: Array, size: float) -> tuple[Array, Array, NDArray[np.int64]]:
+    """Cut edges (n, 2, 2) or triangles (n, 3, 3) into like pieces of about `size` [m].
+
+    Returns:
+        Their centres, their lengths or areas, and the faces that they are of.
+    """
+    places: list[Array] = []
+    areas: list[float] = []
+    of: list[int] = []
+    left = [(corners, face) for face, corners in enumerate(faces)]
+    while left:
+        corners, face = left.pop()
+        sides = np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1)
+        longest = float(sides.max())
+        n = max(1, math.ceil(longest / size))
+        if len(corners) == 2:
+            share = (np.arange(n) + 0.5) / n
+            places += list(corners[0] + share[:, None] * (corners[1] - corners[0]))
+            areas += [longest / n] * n
+            of += [face] * n
+            continue
+        a, b, c = np.roll(corners, -int(sides.argmax()), axis=0)
+        area = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a)))
+        if n > 1 and longest**2 > 8.0 * area:  # slender: halve it
+            left += [(np.array([a, 0.5 * (a + b), c]), face), (np.array([0.5 * (a + b), b, c]), face)]
+            continue
+        for i in range(n):
+            for j in range(n - i):
+                places.append(a + (b - a) * ((i + 1 / 3) / n) + (c - a) * ((j + 1 / 3) / n))
+                if j < n - i - 1:
+                    places.append(a + (b - a) * ((i + 2 / 3) / n) + (c - a) * ((j + 2 / 3) / n))
+        areas += [area / n**2] * n**2
+        of += [face] * n**2
+    return np.array(places), np.array(areas), np.array(of)
 
 
 def polygon(points: Array, name: str = "polygon") -> Shape:
@@ -92,12 +135,8 @@ def polygon(points: Array, name: str = "polygon") -> Shape:
         points = points[::-1]
     if _crossing(points):
         raise MpmError(f"edges of {name} cross each other")
-    edge = np.roll(points, -1, axis=0) - points
-    after = np.roll(edge, -1, axis=0)
-    turns = edge[:, 0] * after[:, 1] - edge[:, 1] * after[:, 0]
     index = np.arange(len(points))
-    convex = bool((turns >= -1e-12 * abs(area)).all())
-    return Shape(name, np.ascontiguousarray(points), np.column_stack([index, np.roll(index, -1)]), convex)
+    return Shape(name, np.ascontiguousarray(points), np.column_stack([index, np.roll(index, -1)]))
 
 
 def mesh(vertices: Array, faces: NDArray[np.int64], name: str = "mesh") -> Shape:
@@ -113,7 +152,7 @@ def mesh(vertices: Array, faces: NDArray[np.int64], name: str = "mesh") -> Shape
         raise MpmError(f"{name} is not closed: every edge must have two faces")
     if body.volume < 0.0:
         body.invert()
-    return Shape(name, np.array(body.vertices), np.array(body.faces, dtype=np.int64), bool(body.is_convex))
+    return Shape(name, np.array(body.vertices), np.array(body.faces, dtype=np.int64))
 
 
 def box(*size: float) -> Shape:
@@ -123,10 +162,16 @@ def box(*size: float) -> Shape:
     half = np.array(size) / 2.0
     if len(size) == 2:
         return polygon(np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]) * half, "plate")
-    vertices = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)]) * half
-    sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-    faces = np.array([triangle for a, b, c, d in sides for triangle in ((a, b, c), (a, c, d))])
-    return mesh(vertices, faces, "plate")
+    ring = np.array([[1, 0], [1, 1], [0, 1], [-1, 1], [-1, 0], [-1, -1], [0, -1], [1, -1]], float)
+    triangles = []  # eight to a side, about its middle: mirror images of each other
+    for axis in range(3):
+        for side in (-1.0, 1.0):
+            rim = np.insert(ring, axis, side, axis=1) * half
+            middle = np.insert(np.zeros(2), axis, side) * half
+            triangles += [[middle, a, b] for a, b in zip(rim, np.roll(rim, -1, axis=0), strict=True)]
+            if (side > 0.0) == (axis == 1):  # outwards
+                triangles[-8:] = [part[::-1] for part in triangles[-8:]]
+    return mesh(np.reshape(triangles, (-1, 3)), np.arange(3 * len(triangles)).reshape(-1, 3), "plate")
 
 
 def disc(radius: float, sides: int = 48) -> Shape:

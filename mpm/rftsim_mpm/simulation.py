@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rftsim_mpm.bed import Particles
 from rftsim_mpm.body import Body
-from rftsim_mpm.contact import distances, make_contact
+from rftsim_mpm.contact import make_contact
 from rftsim_mpm.errors import MpmError
 from rftsim_mpm.material import Material
 from rftsim_mpm.transfer import make_transfer
@@ -19,13 +19,14 @@ from rftsim_mpm.walls import make_grid_step
 Array = NDArray[np.float64]
 
 INSET = 0.5
-"""How far inside a body's true surface particles are stopped, in cells.
+"""How far inside a body's true surface contact lies, in cells.
 
-Measured: with half a cell the force on a plate pushed down, tilted by 30 degrees or dragged is the same at 10 and 20
-cells per plate, within 5 %; at the surface itself it is first order and high.
+What is pushed on the grid moves with it a good part of a cell further out, so that bodies act too wide and too deep.
 """
+SPACING = 0.25
+"""Between the points of a body's surface, in cells: more make no difference."""
 CONTACT_STIFFNESS = 1.0
-"""Of the contact layer, in Young's moduli per cell: particles sink in by p / E cells."""
+"""Of the contact layer, in Young's moduli per cell: sand sinks in by p / E cells."""
 COURANT = 0.3
 """Time step in cells per compression wave."""
 SORT_EVERY = 80
@@ -44,15 +45,6 @@ class _Kernels(NamedTuple):
 @cache
 def _kernels(dim: int) -> _Kernels:
     return _Kernels(*make_transfer(dim), make_grid_step(dim), make_contact(dim))
-
-
-class Contacts(NamedTuple):
-    """One body's contacts at the last step."""
-
-    place: Array
-    """Of the particles, in the body's frame, (n, dim) [m]."""
-    force: Array
-    """Of each on the body, in the body's frame, (n, dim) [N]."""
 
 
 class Simulation:
@@ -103,16 +95,17 @@ class Simulation:
         """Of the sand on each body at the last step [N]."""
         self.moment = np.zeros((len(self.bodies), 1 if dim == 2 else 3))
         """About each body's origin [N m]."""
-        self.contacts: list[Contacts] = []
         self.xpic = xpic
         self._shape = np.array(cells) + 3
         self._low = np.zeros(dim)
         self._kernels = _kernels(dim)
         nodes = int(np.prod(self._shape))
         self._grid, self._flow = np.zeros((nodes, 1 + 2 * dim)), np.zeros((nodes, 2 * dim))
-        self._hit, self._push = np.zeros(len(particles), np.int64), np.zeros((len(particles), dim))
         self.inset = inset * dx
-        self._distances = [body.shape.distance(0.25 * dx) for body in self.bodies]
+        self.surfaces = [body.shape.surface(SPACING * dx, self.inset) for body in self.bodies]
+        """Of each body, where it touches the sand."""
+        self.traction = [np.zeros_like(surface.points) for surface in self.surfaces]
+        """Of each on the sand at the last step, at the surface's points and in the body's frame, (n, dim) [Pa]."""
         self._check()
 
     def _check(self) -> None:
@@ -121,19 +114,18 @@ class Simulation:
             raise MpmError("there is no sand")
         if (p.x < 0.0).any() or (p.x > self.size).any():
             raise MpmError(f"particles lie outside the box of {' x '.join(f'{s:g}' for s in self.size)} m")
-        for body, distance in zip(self.bodies, self._distances, strict=True):
-            deepest = -float(distance.table.min()) if distance.table.size else float(distance.planes[:, -1].min())
-            if deepest <= 1.05 * self.inset:
+        for body, surface in zip(self.bodies, self.surfaces, strict=True):
+            if len(surface.points) == 0:
                 raise MpmError(
                     f"{body.shape.name} is too thin for cells of {self.dx:g} m: contact lies {self.inset:g} m inside "
-                    f"its surface, and it is {2.0 * deepest:g} m thick; use smaller cells"
+                    "its surface; use smaller cells"
                 )
 
     def clear_bodies(self) -> None:
         """Take away the sand that bodies occupy."""
         keep = np.ones(len(self.particles), bool)
-        for body, distance in zip(self.bodies, self._distances, strict=True):
-            keep &= distances(distance, np.ascontiguousarray(body.to_local(self.particles.x))) > -self.inset
+        for body in self.bodies:
+            keep &= body.shape.distances(body.to_local(self.particles.x)) > -self.inset
         self.particles.select(keep)
         self._check()
 
@@ -171,19 +163,18 @@ class Simulation:
         p.v -= rest
 
     def _touch(self) -> None:
-        p = self.particles
-        self.contacts = []
-        for i, (body, distance) in enumerate(zip(self.bodies, self._distances, strict=True)):
-            layer = (self.inset, CONTACT_STIFFNESS * self.material.young / self.dx, body.friction)
-            count = self._kernels.touch(
-                p.x, p.volume, self._low, 1.0 / self.dx, self._shape, distance, body.position, body.rotation, i + 1,
-                layer, p.anchor, p.held, self._hit, self._push, self._grid,
+        full = self.material.rho_c * self.dx**self.particles.dim
+        stiffness = CONTACT_STIFFNESS * self.material.young / self.dx * self.dt
+        for i, (body, surface) in enumerate(zip(self.bodies, self.surfaces, strict=True)):
+            place, push = np.empty_like(surface.points), np.empty_like(surface.points)
+            self._kernels.touch(
+                self._grid, self._low, 1.0 / self.dx, self._shape, full,
+                (body.position, body.rotation, body.velocity, body.spin), *surface,
+                stiffness, body.friction, self.traction[i], place, push,
             )  # fmt: skip
-            force = -self._push[:count]
-            arm = p.x[self._hit[:count]] - body.position
-            self.force[i] = force.sum(axis=0)
-            if p.dim == 2:
-                self.moment[i, 0] = float(np.sum(arm[:, 1] * force[:, 0] - arm[:, 0] * force[:, 1]))
+            self.force[i] = -push.sum(axis=0)
+            arm = place - body.position
+            if arm.shape[1] == 2:
+                self.moment[i, 0] = float(np.sum(arm[:, 0] * push[:, 1] - arm[:, 1] * push[:, 0]))
             else:
-                self.moment[i] = np.cross(arm, force).sum(axis=0)
-            self.contacts.append(Contacts(arm @ body.rotation, force @ body.rotation))
+                self.moment[i] = -np.cross(arm, push).sum(axis=0)

@@ -15,7 +15,7 @@ from rftsim_mpm.transfer import OPTIONS
 
 
 @njit(inline="always")
-def _images(shape, at, found):
+def mirrored(shape, at, found):
     """Fill a node's images behind the walls it is next to, itself first; returns how many.
 
     A row of `found` is the image's number and, for each axis, the sign that mirroring gives to that component.
@@ -112,7 +112,7 @@ def make_grid_step(dim: int) -> Any:
                     flow[node, a] = grid[node, 1 + a] * inverse + change
                     flow[node, DIM + a] = change
                 continue
-            images = _images(shape, at, found)
+            images = mirrored(shape, at, found)
             mass = 0.0
             for image in range(images):
                 mass += grid[found[image, 0], 0]

@@ -6,7 +6,6 @@ import matplotlib.image
 import numpy as np
 import pytest
 import trimesh
-from rftsim_mpm.contact import distances
 from rftsim_mpm.errors import MpmError
 from rftsim_mpm.shapes import box, disc, extruded, mesh, polygon, wheel
 from rftsim_mpm.silhouette import load_shape
@@ -32,43 +31,48 @@ def test_the_wheel_is_a_disc_with_lugs():
     """Area of Table 4.1's wheel: pi r^2 of the disc and 20 grousers of 12 x 6 mm, but for the arc's chords."""
     assert wheel(arc=40).content == pytest.approx(math.pi * 0.094**2 + 20 * 0.012 * 0.006, rel=2e-3)
     assert wheel().radius == pytest.approx(math.hypot(0.106, 0.003))
-    assert not wheel().convex
 
 
-def test_distances_of_a_table_are_those_of_the_shape():
-    """An L: exact to rounding away from its corners, and signed."""
-    table = polygon(ELL).distance(0.05)
+def test_distances_of_a_polygon():
+    """An L: signed, and infinite where it is too far to matter."""
     points = np.array([[0.5, 2.0], [2.0, 0.25], [2.0, 2.0], [0.5, -0.4], [0.2, 1.5]])
-    expected = [-0.5, -0.25, 1.0, 0.4, -0.2]
-    assert np.isinf(distances(table, points)[3]), "too far to matter"
-    near = [0, 1, 2, 4]
-    np.testing.assert_allclose(distances(table, points)[near], np.array(expected)[near], atol=1e-9)
+    np.testing.assert_allclose(polygon(ELL).distances(points), [-0.5, -0.25, 1.0, np.inf, -0.2], atol=1e-12)
 
 
 def test_distances_of_a_mesh_are_those_of_trimesh():
-    """A ring, which is not convex, against an independent distance."""
+    """A ring, against an independent distance."""
     ring = trimesh.creation.annulus(0.5, 1.0, 0.6, sections=12)
     shape = mesh(np.array(ring.vertices), np.array(ring.faces))
-    assert not shape.convex
-    rng = np.random.default_rng(0)
-    points = rng.uniform([-1.0, -1.0, -0.3], [1.0, 1.0, 0.3], (300, 3))
+    points = np.random.default_rng(0).uniform([-0.9, -0.9, -0.3], [0.9, 0.9, 0.3], (300, 3))
+    _, expected, _ = trimesh.proximity.closest_point_naive(ring, points)
+    found = shape.distances(points)
+    np.testing.assert_allclose(np.abs(found), expected, atol=1e-12)
     radius = np.linalg.norm(points[:, :2], axis=1)
-    points = points[(radius > 0.65) & (radius < 0.8)]
-    assert len(points) > 20
-    found = distances(shape.distance(0.03), points)
-    closest, expected, _ = trimesh.proximity.closest_point_naive(ring, points)
-    assert len(closest) == len(points)
-    np.testing.assert_allclose(found, -expected, atol=0.012)
+    assert (found[radius < 0.48] > 0.0).all()
+    assert (found[(radius > 0.5) & (radius < 0.96)] < 0.0).all()
 
 
-def test_convex_and_tabulated_distances_agree_inside():
-    square = box(0.2, 0.3)
-    notched = polygon(np.vstack([square.vertices, [[-0.1, 0.0], [-0.0999, -0.001]]]))
-    assert square.convex
-    assert not notched.convex
-    points = np.array([[0.0, 0.0], [0.05, 0.1], [0.09, -0.1], [0.0, -0.14]])
-    found = distances(notched.distance(0.005), points)
-    np.testing.assert_allclose(found, distances(square.distance(0.005), points), atol=2.5e-3)
+@pytest.mark.parametrize(("shape", "around"), [(box(2.0, 3.0), 6.0), (polygon(ELL), 8.0), (box(2.0, 3.0, 4.0), 22.0)])
+def test_points_lie_all_over_the_surface_inside(shape, around):
+    """On the surface half a metre inside, with their own face's normal; re-entrant corners are left open."""
+    surface = shape.surface(0.1, 0.5 if shape.name == "plate" else 0.25)
+    inset = 0.5 if shape.name == "plate" else 0.25
+    np.testing.assert_allclose(shape.distances(surface.points), -inset, atol=1e-5)
+    beyond = shape.distances(surface.points + 0.2 * surface.normals)
+    np.testing.assert_allclose(beyond, 0.2 - inset, atol=0.1)
+    assert surface.areas.sum() == pytest.approx(around if shape.name == "plate" else 10.0, rel=0.03)
+
+
+def test_points_of_a_box_are_mirror_images():
+    """So that half a plate is the half of a plate, to round-off; none lies in a plane of symmetry."""
+    surface = box(2.0, 3.0, 0.4).surface(0.17)
+    for axis in range(3):
+        other = surface.points.copy()
+        other[:, axis] *= -1.0
+        assert np.abs(surface.points[:, axis]).min() > 1e-3
+        a, b = (np.array(sorted(map(tuple, x.round(9) + 0.0))) for x in (surface.points, other))
+        np.testing.assert_allclose(a, b, atol=1e-8)
+    assert surface.areas.sum() == pytest.approx(2.0 * (2.0 * 3.0 + 5.0 * 0.4))
 
 
 def test_a_picture_becomes_a_polygon(tmp_path):

@@ -171,14 +171,14 @@ def test_a_body_slides_on_sand_by_its_friction():
     stiff, mu, angle = Material.of_density(math.inf, 1500.0, 1e6), 0.2, math.radians(20.0)
     bed = level_bed(stiff, (0.4, 0.05), 0.01, gravity=9.81 * math.cos(angle))
     gravity = 9.81 * np.array([math.sin(angle), -math.cos(angle)])
-    sinks = 0.0075  # contact is half a cell inside, and the particles are a quarter below the surface
+    sinks = 0.005  # contact is half a cell inside
     mass = 6.0
     body = Body(box(0.06, 0.04), np.array([0.1, 0.05 + 0.02 - sinks]), np.zeros(2), mu, mass=mass, load=mass * gravity)
     sim = Simulation(stiff, bed, 0.01, (0.4, 0.12), bodies=[body], gravity=gravity, wall_friction=math.inf)
     while sim.time < 0.15:
         sim.step()
-    expected = 9.81 * (math.sin(angle) - mu * math.cos(angle)) * sim.time
-    assert body.velocity[0] == pytest.approx(expected, rel=0.03)
+    pressed = 9.81 * math.cos(angle) * sim.time + body.velocity[1]  # it still bounces a little
+    assert body.velocity[0] == pytest.approx(9.81 * math.sin(angle) * sim.time - mu * pressed, rel=0.005)
 
 
 @pytest.mark.parametrize("spin", [2.0, 5.0])
@@ -215,8 +215,8 @@ def test_free_rotation_keeps_angular_momentum():
     assert errors[1] < 0.6 * errors[0]
 
 
-def test_concave_and_convex_descriptions_agree():
-    """An L of two boxes: the tabulated distance pushes as the planes do, where both describe the same face."""
+def test_a_notch_that_the_sand_does_not_see_changes_nothing():
+    """Two outlines with the same lower face push alike."""
     forces = []
     for shape in (box(0.06, 0.06), polygon(np.vstack([box(0.06, 0.06).vertices, [[-0.03, 0.0], [-0.02999, -0.0001]]]))):
         bed, size = small_bed(2)
