@@ -9,6 +9,7 @@ from rftsim_models import parts
 from rftsim_models.hexapod import HEXAPOD, LEGS, TRIPODS, build_hexapod
 
 from rftsim_envs.physics import Array, Flags
+from rftsim_envs.recipe import Drive, Training, constant
 from rftsim_envs.task import Config, Moment, Task, to_body, yaw_of
 
 UNIT: Final = float(np.sqrt(9.81 * HEXAPOD.hip_height))
@@ -57,6 +58,7 @@ class CLegHexapod(Task):
     Settings = HexapodConfig
     edge = parts.AS_MESHED
     naction = len(LEGS)
+    training = Training(steps=1_000_000, n_steps=64, batch_size=1024, layers=(128, 128), log_std_init=-1.0)
     config: HexapodConfig
 
     def build(self) -> mujoco.MjSpec:
@@ -113,6 +115,10 @@ class CLegHexapod(Task):
         """See `Task`."""
         drift = (moment.qpos[:, 1] - moment.before[:, 1]) / moment.period
         return {"speed": self.speed(moment), "drift": drift, "heading": yaw_of(moment.qpos[:, 3:7])}
+
+    def open_loops(self) -> dict[str, Drive]:
+        """The alternating tripod gait at constant rates."""
+        return {f"{rate} rad/s": constant(*[rate / HEXAPOD.rate] * len(LEGS)) for rate in range(3, 31, 3)}
 
 
 def running_straight(

@@ -8,7 +8,7 @@ import numpy as np
 from rftsim_models.wheels import FOUR_FLAP_RUNNER, build_wheel
 
 from rftsim_envs.physics import Array
-from rftsim_envs.recipe import Drive, constant
+from rftsim_envs.recipe import Drive, Training, constant
 from rftsim_envs.task import Config, Moment, Task
 
 RUNNER: Final = dataclasses.replace(FOUR_FLAP_RUNNER, arc=3, flank=6, top=1)
@@ -65,6 +65,7 @@ class FourFlapRunner(Task):
     planar = True
     edge = 2.0
     naction = 1
+    training = Training(steps=400_000, n_steps=64, batch_size=1024, log_std_init=-1.0)
     config: RunnerConfig
 
     def build(self) -> mujoco.MjSpec:
@@ -98,7 +99,7 @@ class FourFlapRunner(Task):
 
     def open_loops(self) -> dict[str, Drive]:
         """Constant rates."""
-        return {f"{rate:g} rad/s": constant(rate / TOP_RATE) for rate in (3, 6, 9, 12, 15, 18, 21, 24, 27, 30)}
+        return {f"{rate:g} rad/s": constant(rate / TOP_RATE) for rate in range(2, 21, 2)}
 
     def measures(self, moment: Moment) -> dict[str, Array]:
         """See `Task`."""

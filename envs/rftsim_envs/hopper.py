@@ -9,6 +9,7 @@ from rftsim_models import parts
 from rftsim_models.hopper import HOPPER, JOINTS, RANGES, build_hopper
 
 from rftsim_envs.physics import Array, Flags
+from rftsim_envs.recipe import Drive, Training
 from rftsim_envs.task import Config, ConfigError, Moment, Task
 
 POSE: Final = np.array([-HOPPER.crouch, 2 * HOPPER.crouch, -HOPPER.crouch])
@@ -74,6 +75,7 @@ class Hopper(Task):
     edge = parts.AS_MESHED
     ncommand = 1
     naction = len(JOINTS)
+    training = Training(steps=1_000_000, n_steps=64, batch_size=1024, layers=(128, 128), log_std_init=-0.5)
     config: HopperConfig
 
     def build(self) -> mujoco.MjSpec:
@@ -130,6 +132,29 @@ class Hopper(Task):
             "command": moment.command[:, 0].copy(),
             "height": moment.qpos[:, 1].copy(),
         }
+
+    def open_loops(self) -> dict[str, Drive]:
+        """Strokes of the leg at constant rates: the leg's length follows a sine, and the hip swings with it or ahead."""
+        return {
+            f"{hertz:g} Hz, stroke {stroke:g}, swing {swing:g}, ahead {ahead:g} of a turn": _strokes(
+                2.0 * np.pi * hertz, stroke, swing, 2.0 * np.pi * ahead
+            )
+            for hertz in (1.5, 2.0, 2.5, 3.0)
+            for stroke in (0.2, 0.4, 0.7)
+            for swing in (0.1, 0.3)
+            for ahead in (0.0, 0.25, 0.5, 0.75)
+        }
+
+
+def _strokes(rate: float, stroke: float, swing: float, ahead: float) -> Drive:
+    """The leg folds and stretches, hip and ankle half as much as the knee."""
+
+    def drive(time: float) -> Array:
+        fold, swung = stroke * np.sin(rate * time), swing * np.sin(rate * time + ahead)
+        target = np.array([-0.5 * fold + swung, fold, -0.5 * fold - swung]) * REACH[1] / REACH
+        return np.clip(target, -1.0, 1.0)
+
+    return drive
 
 
 def _lean(moment: Moment) -> Array:

@@ -58,7 +58,7 @@ class HexapodParameters:
     torque: float = 1.5
     rate: float = 30.0
     gain: float = 1.0
-    armature: float = 3e-3
+    armature: float = 0.012
     friction: float = 0.05
     segments: int = 7
 
