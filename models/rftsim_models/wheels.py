@@ -11,6 +11,7 @@ from typing import Final, Literal, get_args
 import mujoco
 import numpy as np
 
+from rftsim_models import parts
 from rftsim_models.outline import Array, extruded, lugged_outline
 from rftsim_models.studio import furnish
 
@@ -144,7 +145,7 @@ def build_wheel(
     """A wheel on its carriage, touching level ground at z = 0.
 
     The first actuator has its drive's name and turns the wheel, the second, `push`, pushes the carriage along x.
-    Sensors: `x` and `z` of the axle, `speed`, `rate`, `torque`.
+    Sensors: `x` and `z` of the axle, `speed`, `rate`, `torque`. Camera: `follow`.
 
     Args:
         parameters: The wheel's.
@@ -176,6 +177,7 @@ def build_wheel(
     _weigh(carriage, max(parameters.horizontal_mass - parameters.vertical_mass, 1e-6), 0.1)
     carriage.add_joint(name="x", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[1, 0, 0])
     carriage.gravcomp = 1
+    parts.add_camera(carriage, 5.0 * height + 1.2 * parameters.width)
     wheel = carriage.add_body(name=WHEEL)
     _weigh(wheel, parameters.vertical_mass, parameters.radius)
     wheel.add_joint(name="z", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[0, 0, 1])
