@@ -1,0 +1,170 @@
+"""`rftsim/Quadruped-v0`: a quadruped walks at a commanded velocity."""
+
+import dataclasses
+from typing import Final
+
+import mujoco
+import numpy as np
+from rftsim_models import parts
+from rftsim_models.quadruped import FEET, QUADRUPED, RANGES, build_quadruped
+
+from rftsim_envs.physics import Array, Flags
+from rftsim_envs.task import Config, Moment, Task, to_body, yaw_of
+
+REACH: Final = np.tile([0.2, 0.4, 0.4], 4)
+"""Offsets of abduction, hip and knee from the standing pose for an action of 1 [rad]."""
+LOW, HIGH = np.tile(RANGES, (4, 1)).T
+JOINT_RATE: Final = 10.0
+"""What the joints' rates are observed in [rad/s]."""
+TIPPED: Final = 0.5
+"""Cosine of the torso's lean from the vertical below which it has tipped over."""
+GROUNDED: Final = QUADRUPED.height
+"""Height of the torso's middle above the ground below which it is down [m]."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class QuadrupedConfig(Config):
+    """Settings of the quadruped.
+
+    Attributes:
+        forward: Range of the commanded velocity ahead, drawn for each episode [m/s].
+        sideways: Range of that to the left [m/s].
+        turning: Range of the commanded yaw rate [rad/s].
+        width: Error of the velocity at which its reward has fallen to 1/e [m/s].
+        turning_width: Error of the yaw rate at which its reward has fallen to 1/e [rad/s].
+        energy: Weight of the power in the reward.
+        haste: Weight of the actions' changes in the reward.
+        tilt: Weight of the torso's lean in the reward.
+    """
+
+    forward: tuple[float, float] = (0.0, 0.6)
+    sideways: tuple[float, float] = (-0.1, 0.1)
+    turning: tuple[float, float] = (-0.2, 0.2)
+    width: float = 0.25
+    turning_width: float = 0.5
+    energy: float = 0.2
+    haste: float = 0.02
+    tilt: float = 1.0
+
+
+class Quadruped(Task):
+    """A quadruped (11 kg, twelve joints, rounded feet) that follows a velocity in its own heading.
+
+    Action, 12 numbers: targets of the joints' position servos less the standing pose, in the order of
+    `rftsim_models.quadruped.JOINTS`: -1 to 1 for -0.2 to 0.2 rad of abduction and -0.4 to 0.4 rad of hips and knees.
+
+    | observation | size | unit |
+    |---|---|---|
+    | commanded velocity ahead and to the left | 2 | m/s |
+    | commanded yaw rate | 1 | rad/s |
+    | gravity, in the torso's axes | 3 | g |
+    | linear velocity, in the torso's axes | 3 | m/s |
+    | angular velocity, in the torso's axes | 3 | rad/s |
+    | angles of the joints less the standing pose | 12 | rad |
+    | rates of the joints | 12 | 10 rad/s |
+    | last action | 12 | - |
+
+    Reward per second: exp(-|v - commanded v|^2 / width^2) + exp(-(w - commanded w)^2 / turning_width^2) / 2
+    - energy P / (m g 1 m/s) - haste |a - last a|^2 - tilt (g_x^2 + g_y^2), v the velocity over the ground in the
+    heading's axes and w the yaw rate, both means over the control step as is the servos' positive power P, and g the
+    direction of gravity in the torso's axes.
+    The episode ends in failure where the torso leans 60 deg from the vertical, or its middle is less than 0.1 m above
+    the ground.
+
+    `info`: `speed`, ahead, `sideways` [m/s], `turning` [rad/s], `error`, of the velocity over the ground [m/s],
+    `height` of the torso's middle [m], `tilt` from the vertical [rad], and what all tasks tell.
+    """
+
+    Settings = QuadrupedConfig
+    felt = (parts.TORSO, *FEET)
+    edge = parts.AS_MESHED
+    ncommand = 3
+    naction = 12
+    config: QuadrupedConfig
+
+    def build(self) -> mujoco.MjSpec:
+        """See `Task`."""
+        return build_quadruped()
+
+    def prepare(self, model: mujoco.MjModel) -> None:
+        """See `Task`."""
+        super().prepare(model)
+        self._stance: Array = model.key_ctrl[0].copy()
+        self._weight = float(model.body_mass.sum() * np.linalg.norm(model.opt.gravity))
+
+    def start(self, rng: np.random.Generator, qpos: Array, qvel: Array) -> Array:
+        """Standing, joints off by up to 0.05 rad."""
+        qpos[7:] += rng.uniform(-0.05, 0.05, 12)
+        c = self.config
+        return np.array([rng.uniform(*pair) for pair in (c.forward, c.sideways, c.turning)])
+
+    def controls(self, action: Array, moment: Moment) -> Array:
+        """See `Task`."""
+        return np.clip(self._stance + REACH * action, LOW, HIGH)
+
+    def observe(self, moment: Moment) -> Array:
+        """See `Task`."""
+        turn = moment.qpos[:, 3:7]
+        return np.column_stack(
+            [
+                moment.command,
+                to_body(turn, moment.gravity),
+                to_body(turn, moment.qvel[:, :3]),
+                moment.qvel[:, 3:6],
+                moment.qpos[:, 7:] - self._stance,
+                moment.qvel[:, 6:] / JOINT_RATE,
+                moment.action,
+            ]
+        )
+
+    def rewards(self, moment: Moment) -> dict[str, Array]:
+        """See `Task`."""
+        c, down = self.config, to_body(moment.qpos[:, 3:7], moment.gravity)
+        return {
+            "velocity": closeness(_velocity(moment) - moment.command[:, :2], c.width),
+            "turning": 0.5 * closeness(_turning(moment)[:, None] - moment.command[:, 2:], c.turning_width),
+            "power": -c.energy * moment.power / self._weight,
+            "haste": -c.haste * ((moment.action - moment.last) ** 2).sum(axis=1),
+            "tilt": -c.tilt * (down[:, :2] ** 2).sum(axis=1),
+        }
+
+    def failed(self, moment: Moment) -> Flags:
+        """See `Task`."""
+        upright = -to_body(moment.qpos[:, 3:7], moment.gravity)[:, 2]
+        return (upright < TIPPED) | (moment.qpos[:, 2] < GROUNDED)
+
+    def measures(self, moment: Moment) -> dict[str, Array]:
+        """See `Task`."""
+        ahead, sideways = _velocity(moment).T
+        down = to_body(moment.qpos[:, 3:7], moment.gravity)
+        return {
+            "speed": ahead,
+            "sideways": sideways,
+            "turning": _turning(moment),
+            "error": np.linalg.norm(_velocity(moment) - moment.command[:, :2], axis=1),
+            "height": moment.qpos[:, 2].copy(),
+            "tilt": np.arccos(np.clip(-down[:, 2], -1.0, 1.0)),
+        }
+
+    def speed(self, moment: Moment) -> Array:
+        """Mean speed ahead over the step [m/s], (n,)."""
+        return _velocity(moment)[:, 0]
+
+
+def closeness(error: Array, width: float) -> Array:
+    """1 where the error (n, k) is zero, 1/e where it is as large as the width."""
+    value: Array = np.exp(-(error**2).sum(axis=1) / width**2)
+    return value
+
+
+def _velocity(moment: Moment) -> Array:
+    """Mean velocity over the ground over the step, ahead and to the left [m/s], (n, 2)."""
+    moved, yaw = (moment.qpos - moment.before)[:, :2] / moment.period, yaw_of(moment.before[:, 3:7])
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    return np.column_stack([cos * moved[:, 0] + sin * moved[:, 1], cos * moved[:, 1] - sin * moved[:, 0]])
+
+
+def _turning(moment: Moment) -> Array:
+    """Mean yaw rate over the step [rad/s], (n,)."""
+    turned = yaw_of(moment.qpos[:, 3:7]) - yaw_of(moment.before[:, 3:7])
+    return np.arctan2(np.sin(turned), np.cos(turned)) / moment.period

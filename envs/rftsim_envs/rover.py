@@ -1,0 +1,197 @@
+"""`rftsim/Rover-v0`: a six-wheeled rover drives to a goal over flat and tilted sand, without digging in."""
+
+import dataclasses
+from typing import Final
+
+import mujoco
+import numpy as np
+from rftsim_models import parts
+from rftsim_models.rover import ROVER, WHEELS, build_rover
+
+from rftsim_envs.physics import Array, Flags
+from rftsim_envs.task import UPRIGHT, Config, Moment, Task, to_body, yaw_of
+
+RADIUS: Final = ROVER.wheel.outer_radius
+TOP_SPEED: Final = ROVER.rate * RADIUS
+"""Of the rims; what speeds are observed and rewarded in [m/s]."""
+SIDES: Final = np.array([1 if "left" in wheel else -1 for wheel in WHEELS])
+CREEP: Final = 0.05
+"""Speed at which slip counts as digging by half [m/s]."""
+ARRIVED: Final = 0.2
+"""Distance to the goal [m]."""
+TIPPED: Final = 0.5
+"""Cosine of the torso's lean from the ground's normal below which it has tipped over."""
+BURIED: Final = 0.2
+"""Height of a hub above the ground, over its wheel's outer radius, below which the wheel is dug in."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class RoverConfig(Config):
+    """Settings of the rover.
+
+    Attributes:
+        distance: Range of the goal's distance, drawn for each episode [m].
+        sector_deg: Largest angle between the goal and straight ahead at the start [deg].
+        arrival: Reward for reaching the goal.
+        digging: Weight of the digging in the reward.
+        energy: Weight of the power in the reward.
+    """
+
+    sand: str = "medium-sand"
+    slope_deg: float = 10.0
+    period: float = 0.05
+    duration: float = 20.0
+    distance: tuple[float, float] = (1.0, 3.0)
+    sector_deg: float = 60.0
+    arrival: float = 5.0
+    digging: float = 0.5
+    energy: float = 0.5
+
+
+class Rover(Task):
+    """A rover of Sojourner's size (11.2 kg, six grousered wheels on rockers and bogies), steered by skidding.
+
+    Action, 2 numbers: rates of the left and of the right wheels, -1 to 1 for -6 to 6 rad/s. The wheels of a side share
+    one, as in all skid steering: what they could do against each other would only dig.
+
+    | observation | size | unit |
+    |---|---|---|
+    | distance to the goal | 1 | m |
+    | sine and cosine of the goal's bearing | 2 | - |
+    | gravity, in the torso's axes | 3 | g |
+    | linear velocity, in the torso's axes | 3 | top speed of the rims, 0.408 m/s |
+    | angular velocity, in the torso's axes | 3 | rad/s |
+    | rates of the wheels | 6 | 6 rad/s |
+    | slip speeds of the wheels | 6 | 0.408 m/s |
+    | last action | 2 | - |
+
+    Wheels are in the order of `rftsim_models.rover.WHEELS`. The slip speed of one is that of its rim less that of its
+    side of the torso.
+    Reward: arrival, once; and per second: progress to the goal / 0.408 m/s - energy P / (m g 0.408 m/s) - digging d, P
+    the drives' positive power, a mean over the control step, and d the wheels' mean slip speed over 0.408 m/s, times
+    1 / (1 + (v / 0.05 m/s)^2) for the torso's speed v.
+    The episode ends in success 0.2 m from the goal, and in failure where the torso leans 60 deg from the ground's
+    normal, or a hub is less than a fifth of its wheel's radius above the ground.
+
+    `info`: `speed`, over the ground [m/s], `distance` to the goal [m], `slip`, mean over the wheels of what rim and
+    torso differ in, over the faster, `sinkage` of the deepest wheel, outer radius less height of the hub [m], and what
+    all tasks tell.
+    """
+
+    Settings = RoverConfig
+    felt = (parts.TORSO, *WHEELS)
+    edge = parts.AS_MESHED
+    ncommand = 2
+    naction = 2
+    config: RoverConfig
+
+    def build(self) -> mujoco.MjSpec:
+        """The rover, with sensors of where its hubs are."""
+        spec = build_rover()
+        for wheel in WHEELS:
+            place, body = mujoco.mjtSensor.mjSENS_FRAMEPOS, mujoco.mjtObj.mjOBJ_XBODY
+            spec.add_sensor(name=f"{wheel}_hub", type=place, objtype=body, objname=wheel)
+        return spec
+
+    def prepare(self, model: mujoco.MjModel) -> None:
+        """See `Task`."""
+        super().prepare(model)
+        self._rates = [model.joint(wheel).dofadr[0] for wheel in WHEELS]
+        self._heights = [model.sensor(f"{wheel}_hub").adr[0] + 2 for wheel in WHEELS]
+        self._weight = float(model.body_mass.sum() * np.linalg.norm(model.opt.gravity))
+
+    def start(self, rng: np.random.Generator, qpos: Array, qvel: Array) -> Array:
+        """At rest on the ground; the command is the goal's place."""
+        sector = np.deg2rad(self.config.sector_deg)
+        distance, bearing = rng.uniform(*self.config.distance), rng.uniform(-sector, sector)
+        return np.array([distance * np.cos(bearing), distance * np.sin(bearing)])
+
+    def controls(self, action: Array, moment: Moment) -> Array:
+        """See `Task`."""
+        return ROVER.rate * np.where(SIDES > 0, action[:, :1], action[:, 1:])
+
+    def observe(self, moment: Moment) -> Array:
+        """See `Task`."""
+        turn, away = moment.qpos[:, 3:7], moment.command - moment.qpos[:, :2]
+        bearing = np.arctan2(away[:, 1], away[:, 0]) - yaw_of(turn)
+        velocity, rates = to_body(turn, moment.qvel[:, :3]), moment.qvel[:, self._rates]
+        return np.column_stack(
+            [
+                length(away),
+                np.sin(bearing),
+                np.cos(bearing),
+                to_body(turn, moment.gravity),
+                velocity / TOP_SPEED,
+                moment.qvel[:, 3:6],
+                rates / ROVER.rate,
+                (RADIUS * rates - self._passing(moment)) / TOP_SPEED,
+                moment.action,
+            ]
+        )
+
+    def rewards(self, moment: Moment) -> dict[str, Array]:
+        """See `Task`."""
+        c, speed = self.config, self.speed(moment)
+        slip_speed = RADIUS * moment.qvel[:, self._rates] - self._passing(moment)
+        return {
+            "progress": progress(moment.before[:, :2], moment.qpos[:, :2], moment.command) / moment.period / TOP_SPEED,
+            "arrival": np.where(self.reached(moment), c.arrival / moment.period, 0.0),
+            "power": -c.energy * moment.power / (self._weight * TOP_SPEED),
+            "digging": -c.digging * digging(slip_speed, speed) / TOP_SPEED,
+        }
+
+    def failed(self, moment: Moment) -> Flags:
+        """See `Task`."""
+        upright = -to_body(moment.qpos[:, 3:7], np.broadcast_to(UPRIGHT, (len(moment.qpos), 3)))[:, 2]
+        return (upright < TIPPED) | (self._lowest(moment) < BURIED * RADIUS)
+
+    def reached(self, moment: Moment) -> Flags:
+        """See `Task`."""
+        away: Flags = self._distance(moment) < ARRIVED
+        return away
+
+    def measures(self, moment: Moment) -> dict[str, Array]:
+        """See `Task`."""
+        rim, passing = RADIUS * moment.qvel[:, self._rates], self._passing(moment)
+        faster = np.maximum(np.maximum(np.abs(rim), np.abs(passing)), 1e-3)
+        slip: Array = ((rim - passing) / faster).mean(axis=1)
+        return {
+            "speed": self.speed(moment),
+            "distance": self._distance(moment),
+            "slip": slip,
+            "sinkage": RADIUS - self._lowest(moment),
+        }
+
+    def speed(self, moment: Moment) -> Array:
+        """Mean speed over the ground [m/s], (n,)."""
+        return length(moment.qpos[:, :2] - moment.before[:, :2]) / moment.period
+
+    def _distance(self, moment: Moment) -> Array:
+        return length(moment.command - moment.qpos[:, :2])
+
+    def _lowest(self, moment: Moment) -> Array:
+        """Height of the lowest hub above the ground [m], (n,)."""
+        height: Array = moment.sensors[:, self._heights].min(axis=1)
+        return height
+
+    def _passing(self, moment: Moment) -> Array:
+        """Forward speed of the torso beside each wheel [m/s], (n, 6)."""
+        forward = to_body(moment.qpos[:, 3:7], moment.qvel[:, :3])[:, :1]
+        return forward - 0.5 * ROVER.track * SIDES * moment.qvel[:, 5:6]
+
+
+def progress(before: Array, after: Array, goal: Array) -> Array:
+    """How much nearer the goal has come [m]: (n, 2) each."""
+    return length(goal - before) - length(goal - after)
+
+
+def length(vector: Array) -> Array:
+    """Of vectors (n, 2), (n,)."""
+    value: Array = np.hypot(vector[:, 0], vector[:, 1])
+    return value
+
+
+def digging(slip_speed: Array, speed: Array) -> Array:
+    """Mean slip speed of the wheels (n, 6), which counts where the rover stands [m/s]."""
+    mean: Array = np.abs(slip_speed).mean(axis=1)
+    return mean / (1.0 + (speed / CREEP) ** 2)
