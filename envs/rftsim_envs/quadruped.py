@@ -11,7 +11,7 @@ from rftsim_models.quadruped import FEET, QUADRUPED, RANGES, build_quadruped
 from rftsim_envs.physics import Array, Flags
 from rftsim_envs.task import Config, Moment, Task, to_body, yaw_of
 
-REACH: Final = np.tile([0.2, 0.4, 0.4], 4)
+REACH: Final = np.tile([0.15, 0.35, 0.35], 4)
 """Offsets of abduction, hip and knee from the standing pose for an action of 1 [rad]."""
 LOW, HIGH = np.tile(RANGES, (4, 1)).T
 JOINT_RATE: Final = 10.0
@@ -37,21 +37,21 @@ class QuadrupedConfig(Config):
         tilt: Weight of the torso's lean in the reward.
     """
 
-    forward: tuple[float, float] = (0.0, 0.6)
+    forward: tuple[float, float] = (0.2, 0.6)
     sideways: tuple[float, float] = (-0.1, 0.1)
     turning: tuple[float, float] = (-0.2, 0.2)
     width: float = 0.25
     turning_width: float = 0.5
     energy: float = 0.2
     haste: float = 0.02
-    tilt: float = 1.0
+    tilt: float = 2.0
 
 
 class Quadruped(Task):
     """A quadruped (11 kg, twelve joints, rounded feet) that follows a velocity in its own heading.
 
     Action, 12 numbers: targets of the joints' position servos less the standing pose, in the order of
-    `rftsim_models.quadruped.JOINTS`: -1 to 1 for -0.2 to 0.2 rad of abduction and -0.4 to 0.4 rad of hips and knees.
+    `rftsim_models.quadruped.JOINTS`: -1 to 1 for -0.15 to 0.15 rad of abduction and -0.35 to 0.35 rad of hips and knees.
 
     | observation | size | unit |
     |---|---|---|

@@ -1,0 +1,182 @@
+"""Wheel, rover and quadruped as tasks: at rest without action, and what their rewards ask for, a controller can do."""
+
+import numpy as np
+import pytest
+from rftsim_envs import SandEnv, SandVectorEnv
+from rftsim_envs.grouser_wheel import GROUSER_WHEEL, RADIUS, slip, tracking
+from rftsim_envs.quadruped import Quadruped, closeness
+from rftsim_envs.rover import BURIED, Rover, digging, progress
+from rftsim_envs.rover import RADIUS as ROVER_RADIUS
+
+GROUNDS = ("sand", "rigid")
+
+
+def run(env, policy, steps, seed=0):
+    """Return of each simulation's first episode within so many steps, and what `info` told at its end."""
+    observation, _ = env.reset(seed=seed)
+    total, last, running = np.zeros(env.num_envs), [{}] * env.num_envs, np.ones(env.num_envs, dtype=bool)
+    for _ in range(steps):
+        observation, reward, terminated, truncated, info = env.step(policy(observation))
+        total += np.where(running, reward, 0.0)
+        ended = terminated | truncated
+        for i in np.flatnonzero(running):
+            source = info["final_info"] if ended[i] else info
+            last[i] = {
+                name: values[i] for name, values in source.items() if not name.startswith("_") and name[:5] != "final"
+            }
+        running &= ~ended
+        if not running.any():
+            break
+    return total, {name: np.array([one[name] for one in last]) for name in last[0] if all(name in one for one in last)}
+
+
+def still(env):
+    return lambda _: np.zeros(env.action_space.shape)
+
+
+@pytest.mark.parametrize("ground", GROUNDS)
+def test_quadruped_that_stands_as_asked_gets_all_but_nothing_less(ground):
+    """1 + 1/2 per second, less what settling costs."""
+    zero = {"forward": (0, 0), "sideways": (0, 0), "turning": (0, 0)}
+    env = SandVectorEnv("Quadruped", 2, ground=ground, duration=2.0, **zero)
+    total, info = run(env, still(env), 100)
+    np.testing.assert_allclose(total, 1.5 * 2.0, rtol=0.02)
+    assert (info["error"] < 1e-3).all()
+    assert (info["tilt"] < 0.02).all()
+
+
+def test_quadruped_is_worth_less_the_faster_it_is_asked_to_walk_and_does_not():
+    totals = []
+    for speed in (0.0, 0.2, 0.5):
+        env = SandVectorEnv("Quadruped", 1, ground="rigid", duration=0.5, forward=(speed, speed))
+        totals.append(run(env, still(env), 25)[0][0])
+    assert totals[0] > totals[1] > totals[2]
+
+
+def test_quadruped_on_its_back_has_failed():
+    env = SandEnv("Quadruped")
+    env.reset(seed=0)
+    env.data.qpos[2:7] = 0.5, 0.0, 1.0, 0.0, 0.0
+    assert env.step(np.zeros(12))[2]
+
+
+@pytest.mark.parametrize("ground", GROUNDS)
+def test_rover_steered_by_the_goals_bearing_arrives(ground):
+    env = SandVectorEnv("Rover", 2, ground=ground, slope_deg=0.0, distance=(0.7, 0.8), sector_deg=30.0)
+
+    def steer(observation):
+        bearing = np.arctan2(observation[:, 1], observation[:, 2])
+        return np.column_stack([0.7 - 1.2 * bearing, 0.7 + 1.2 * bearing])
+
+    total, info = run(env, steer, 120)
+    assert info["reached"].all()
+    assert (total > env.config.arrival).all()
+
+
+@pytest.mark.parametrize(("ground", "slope"), [("sand", 10.0), ("rigid", 10.0)])
+def test_rover_stays_where_it_is(ground, slope):
+    env = SandVectorEnv("Rover", 2, ground=ground, slope_deg=slope, duration=1.0)
+    total, info = run(env, still(env), 20)
+    np.testing.assert_allclose(total, 0.0, atol=0.05)
+    assert (info["sinkage"] < 0.4 * ROVER_RADIUS).all()
+
+
+def test_rover_that_only_spins_its_wheels_digs_in():
+    """In loose poppy seeds opposite rates bury the wheels: failed, and worth less than nothing."""
+    env = SandVectorEnv("Rover", 1, sand="poppy-seeds", slope_deg=0.0)
+    total, info = run(env, lambda _: np.array([[1.0, -1.0]]), 40)
+    assert total[0] < 0.0
+    assert info["sinkage"][0] > (1.0 - BURIED) * ROVER_RADIUS
+
+
+def test_rovers_passing_speed():
+    """Turning on the spot, the left wheels pass backwards at yaw rate times half the track."""
+    env = SandEnv("Rover")
+    env.reset(seed=0)
+    env.data.qvel[5] = 1.0
+    task = env.task
+    assert isinstance(task, Rover)
+    passing = task._passing(env.episodes._moment(env.episodes._qpos, np.zeros(1)))[0]
+    np.testing.assert_allclose(passing, [-0.21] * 3 + [0.21] * 3)
+
+
+@pytest.mark.parametrize("ground", GROUNDS)
+def test_wheel_follows_by_proportional_torque(ground):
+    env = SandVectorEnv("GrouserWheel", 2, ground=ground, speed=(0.3, 0.3), duration=3.0)
+    feed = 0.3 if ground == "sand" else -0.05
+    followed, info = run(env, lambda o: feed + 1.5 * o[:, 1:2] - 0.1 * o[:, 5:6], 150)
+    assert (np.abs(info["speed"] - 0.3) < 0.03).all()
+    rested, _ = run(env, still(env), 150)
+    assert (followed > rested + 0.5).all()
+
+
+def test_wheel_rests_on_sand():
+    env = SandVectorEnv("GrouserWheel", 1)
+    _, info = run(env, still(env), 100)
+    assert abs(info["speed"][0]) < 1e-3
+
+
+def test_wheel_slips_more_against_a_drawbar():
+    """The load is the last term of the observation, over the wheel's weight."""
+    slips = []
+    for load in (0.0, 10.0):
+        env = SandVectorEnv("GrouserWheel", 1, speed=(0.4, 0.4), drawbar=(load, load), observe_drawbar=True)
+        expected = load / (GROUSER_WHEEL.vertical_mass * GROUSER_WHEEL.gravity)
+        assert env.reset(seed=0)[0][0, -1] == pytest.approx(expected)
+        slips.append(run(env, lambda o: 0.3 + 1.5 * o[:, 1:2] - 0.1 * o[:, 5:6], 100)[1]["slip"][0])
+    assert 0.0 < slips[0] < 0.3 < slips[1]
+
+
+def test_pure_rewards():
+    """Of speeds, distances and slip: by hand."""
+    np.testing.assert_allclose(tracking(np.array([0.3, 0.15]), np.array([0.3, 0.3]), 0.15), [1.0, np.exp(-1)])
+    np.testing.assert_allclose(slip(np.array([0.2, 0.1, 0.0]), np.array([0.1, 0.2, 0.0])), [0.5, -0.5, 0.0])
+    np.testing.assert_allclose(progress(np.zeros((1, 2)), np.array([[0.3, 0.4]]), np.array([[3.0, 4.0]])), [0.5])
+    np.testing.assert_allclose(digging(np.full((2, 6), -0.1), np.array([0.0, 0.05])), [0.1, 0.05])
+    np.testing.assert_allclose(closeness(np.array([[0.15, 0.2], [0.0, 0.0]]), 0.25), [np.exp(-1), 1.0])
+
+
+@pytest.mark.parametrize("name", ["GrouserWheel", "Quadruped", "Rover"])
+@pytest.mark.parametrize("ground", GROUNDS)
+def test_batch_is_bit_equal_to_single(name, ground):
+    settings = {"ground": ground, "slope_deg": 8.0, "strength": (0.5, 2.0), "friction": (0.7, 1.3), "duration": 0.2}
+    many, ones = SandVectorEnv(name, 2, **settings), [SandEnv(name, **settings) for _ in range(2)]
+    seen = many.reset(seed=3)[0]
+    np.testing.assert_array_equal(seen, [one.reset(seed=3 + i)[0] for i, one in enumerate(ones)])
+    rng = np.random.default_rng(0)
+    for _ in range(round(0.2 / many.config.period)):
+        action = rng.uniform(-1.0, 1.0, many.action_space.shape)
+        observation, reward, terminated, truncated, info = many.step(action)
+        for i, one in enumerate(ones):
+            alone = one.step(action[i])
+            final = info["final_obs"][i] if terminated[i] or truncated[i] else observation[i]
+            np.testing.assert_array_equal(final, alone[0])
+            assert (reward[i], terminated[i], truncated[i]) == alone[1:4]
+    assert truncated.all()
+
+
+@pytest.mark.parametrize(("name", "size"), [("GrouserWheel", 8), ("Quadruped", 48), ("Rover", 26)])
+def test_observation_is_as_tabulated(name, size):
+    env = SandEnv(name)
+    rows = [line.split("|") for line in (type(env.task).__doc__ or "").splitlines() if line.strip().startswith("|")]
+    counted = sum(int(row[2]) for row in rows[2:] if ", if " not in row[1])
+    assert counted == size == env.observation_space.shape[0]
+
+
+def test_quadruped_speed_is_in_its_own_heading():
+    env = SandEnv("Quadruped")
+    env.reset(seed=0)
+    qpos = env.episodes._qpos.copy()
+    qpos[0, 3:7] = np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)
+    later = qpos.copy()
+    later[0, 1] += 0.5 * env.config.period
+    moment = env.episodes._moment(qpos, np.zeros(1))._replace(qpos=later)
+    assert isinstance(env.task, Quadruped)
+    assert env.task.speed(moment)[0] == pytest.approx(0.5)
+
+
+def test_wheel_start_is_at_rest_on_its_lugs():
+    env = SandEnv("GrouserWheel")
+    env.reset(seed=0)
+    assert env.data.body("wheel").xpos[2] == pytest.approx(RADIUS)
+    np.testing.assert_array_equal(env.data.qvel, 0.0)
