@@ -7,10 +7,10 @@ import mujoco
 import numpy as np
 from gymnasium.utils import EzPickle
 from numpy.typing import ArrayLike, NDArray
+
 from rftsim_envs import ground, tasks
 from rftsim_envs.episodes import Episodes, Observation
 from rftsim_envs.physics import One
-from rftsim_envs.task import make_config
 
 Action = NDArray[np.float32]
 
@@ -52,7 +52,8 @@ class SandEnv(gym.Env[Observation, Action], EzPickle):
         self.episodes = Episodes(self.task, self.physics)
         self.metadata = self.metadata | {"render_fps": round(1.0 / self.config.period)}
         self.observation_space, self.action_space = spaces(self.episodes)
-        self._size, self._renderer = (width, height), None
+        self._size = width, height
+        self._renderer: mujoco.Renderer | None = None
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -73,7 +74,7 @@ class SandEnv(gym.Env[Observation, Action], EzPickle):
             _alone(out.info),
         )
 
-    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
+    def render(self) -> NDArray[np.uint8] | None:
         """A picture, (height, width, 3)."""
         if self.render_mode is None:
             return None
@@ -91,7 +92,7 @@ class SandEnv(gym.Env[Observation, Action], EzPickle):
             self._renderer = None
 
 
-def spaces(episodes: Episodes) -> tuple[gym.spaces.Box, gym.spaces.Box]:
+def spaces(episodes: Episodes) -> tuple[Any, Any]:
     """Observations and actions of one simulation."""
     return (
         gym.spaces.Box(-np.inf, np.inf, (episodes.nobservation,), np.float32),

@@ -5,9 +5,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from rftsim_envs.ground import NUMBERS, Ground, draw
-from rftsim_envs.physics import Array, Flags, Physics
+
+from rftsim_envs.ground import Ground, draw
 from rftsim_envs.limits import Limits
+from rftsim_envs.physics import Array, Flags, Physics
 from rftsim_envs.task import Moment, Task
 
 Observation = NDArray[np.float32]
@@ -88,7 +89,7 @@ class Episodes:
         """
         wanted = np.array(action, dtype=float)
         if wanted.shape != self._action.shape or not np.isfinite(wanted).all():
-            raise ValueError(f"the action must be finite and of shape {self._action.shape}, not {action}")
+            raise ValueError(f"the action must be finite and of shape {self._action.shape}, not {action!r}")
         task, period = self.task, self.task.config.period
         before, power = self._qpos.copy(), np.zeros(self.physics.n)
         self._last, self._action = self._action, np.clip(wanted, -1.0, 1.0)

@@ -1,7 +1,7 @@
 """`rftsim/FourFlapRunner-v0`: a wheel of four flaps runs fast, and cheaply."""
 
 import dataclasses
-from typing import Any, Final, Literal
+from typing import Final, Literal
 
 import mujoco
 import numpy as np

@@ -5,11 +5,12 @@ from typing import Final, NamedTuple
 
 import mujoco
 import numpy as np
+
+from rftsim.packed import SAND_FIELDS
+from rftsim.readout import instances
+from rftsim.scene import add_sand
 from rftsim_envs.physics import Array, Physics
 from rftsim_envs.task import Config, Task
-
-from rftsim import add_sand, instances
-from rftsim.packed import SAND_FIELDS
 
 FRICTION: Final = 0.8
 """Of the rigid floor [-]."""

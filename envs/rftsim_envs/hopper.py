@@ -63,9 +63,9 @@ class Hopper(Task):
     | rates of hip, knee and ankle | 3 | 10 rad/s |
     | last action | 3 | - |
 
-    Reward per second: exp(-((v - command) / 0.25 m/s)^2) + 0.2 - energy P / (m g 1 m/s) - smooth |change of action|^2, P
-    the motors' positive power. The episode ends early where the hopper has fallen: hip below 0.22 m, or torso leaning by
-    more than 0.9 rad.
+    Reward per second: exp(-((v - command) / 0.25 m/s)^2) + 0.2 - energy P / (m g 1 m/s) - smooth |change of action|^2,
+    P the motors' positive power. The episode ends early where the hopper has fallen: hip below 0.22 m, or torso leaning
+    by more than 0.9 rad.
 
     `info`: `speed` and `command` [m/s], `height` of the hip [m], and what all tasks tell.
     """
@@ -95,7 +95,8 @@ class Hopper(Task):
 
     def controls(self, action: Array, moment: Moment) -> Array:
         """See `Task`."""
-        return np.clip(POSE + REACH * action, *np.transpose(RANGES))
+        target: Array = np.clip(POSE + REACH * action, *np.transpose(RANGES))
+        return target
 
     def observe(self, moment: Moment) -> Array:
         """See `Task`."""
@@ -123,7 +124,8 @@ class Hopper(Task):
 
     def failed(self, moment: Moment) -> Flags:
         """Fallen."""
-        return (moment.qpos[:, 1] < LOWEST) | (_lean(moment)[:, 1] > -np.cos(STEEPEST))
+        fallen: Flags = (moment.qpos[:, 1] < LOWEST) | (_lean(moment)[:, 1] > -np.cos(STEEPEST))
+        return fallen
 
     def measures(self, moment: Moment) -> dict[str, Array]:
         """See `Task`."""
@@ -134,7 +136,7 @@ class Hopper(Task):
         }
 
     def open_loops(self) -> dict[str, Drive]:
-        """Strokes of the leg at constant rates: the leg's length follows a sine, and the hip swings with it or ahead."""
+        """Strokes at constant rates: the leg's length follows a sine, and the hip swings with it or ahead."""
         return {
             f"{hertz:g} Hz, stroke {stroke:g}, swing {swing:g}, ahead {ahead:g} of a turn": _strokes(
                 2.0 * np.pi * hertz, stroke, swing, 2.0 * np.pi * ahead
@@ -152,7 +154,8 @@ def _strokes(rate: float, stroke: float, swing: float, ahead: float) -> Drive:
     def drive(time: float) -> Array:
         fold, swung = stroke * np.sin(rate * time), swing * np.sin(rate * time + ahead)
         target = np.array([-0.5 * fold + swung, fold, -0.5 * fold - swung]) * REACH[1] / REACH
-        return np.clip(target, -1.0, 1.0)
+        action: Array = np.clip(target, -1.0, 1.0)
+        return action
 
     return drive
 

@@ -2,16 +2,16 @@
 
 import numpy as np
 from numpy.typing import NDArray
+
+from rftsim.packed import SAND_FIELDS
+from rftsim.readout import instances
+from rftsim.validity import DEPTH_LIMIT, FROUDE_LIMIT
 from rftsim_envs.physics import Physics
 from rftsim_envs.task import cross
 
-from rftsim import instances
-from rftsim.packed import SAND_FIELDS
-from rftsim.validity import DEPTH_LIMIT, FROUDE_LIMIT
-
 
 class Limits:
-    """The numbers of `rftsim.validity` from the boxes around the bodies that feel the sand, not from their triangles."""
+    """The numbers of `rftsim.validity`, from the boxes around the bodies that feel the sand, not their triangles."""
 
     def __init__(self, physics: Physics) -> None:
         beds = instances(physics.model)
@@ -28,7 +28,7 @@ class Limits:
         self._roots = physics.model.body_rootid[self._bodies]
 
     def measures(self) -> dict[str, NDArray[np.generic]]:
-        """`froude` and `depth_ratio`: the largest of the bodies in the sand, (n,); `in_range`: whether the law holds."""
+        """`froude` and `depth_ratio`, the largest of the bodies, and whether the law is `in_range`; (n,) each."""
         if not self._bodies:
             return {}
         turn = self._turn[:, self._bodies].reshape(-1, len(self._bodies), 3, 3)

@@ -135,7 +135,7 @@ class Many:
     def failed(self) -> Flags:
         """See `Physics`."""
         counts: NDArray[np.int32] = self._batch.warning[:, _FATAL, 1]
-        return counts.any(axis=1)
+        return np.asarray(counts.any(axis=1))
 
     def snapshot(self, i: int) -> mujoco.MjData:
         """See `Physics`; what is not state is that of an mj_forward."""

@@ -51,7 +51,7 @@ class Quadruped(Task):
     """A quadruped (11 kg, twelve joints, rounded feet) that follows a velocity in its own heading.
 
     Action, 12 numbers: targets of the joints' position servos less the standing pose, in the order of
-    `rftsim_models.quadruped.JOINTS`: -1 to 1 for -0.15 to 0.15 rad of abduction and -0.35 to 0.35 rad of hips and knees.
+    `rftsim_models.quadruped.JOINTS`: -1 to 1 for 0.15 rad of abduction and 0.35 rad of hips and knees either way.
 
     | observation | size | unit |
     |---|---|---|

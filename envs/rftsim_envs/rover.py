@@ -9,11 +9,12 @@ from rftsim_models import parts
 from rftsim_models.rover import ROVER, WHEELS, build_rover
 
 from rftsim_envs.physics import Array, Flags
-from rftsim_envs.task import UPRIGHT, Config, Moment, Task, to_body, yaw_of
+from rftsim_envs.task import Config, Moment, Task, to_body, yaw_of
 
 RADIUS: Final = ROVER.wheel.outer_radius
 TOP_SPEED: Final = ROVER.rate * RADIUS
 """Of the rims; what speeds are observed and rewarded in [m/s]."""
+DOWN: Final = np.array([0.0, 0.0, -1.0])
 SIDES: Final = np.array([1 if "left" in wheel else -1 for wheel in WHEELS])
 CREEP: Final = 0.05
 """Speed at which slip counts as digging by half [m/s]."""
@@ -142,7 +143,7 @@ class Rover(Task):
 
     def failed(self, moment: Moment) -> Flags:
         """See `Task`."""
-        upright = -to_body(moment.qpos[:, 3:7], np.broadcast_to(UPRIGHT, (len(moment.qpos), 3)))[:, 2]
+        upright = -to_body(moment.qpos[:, 3:7], np.broadcast_to(DOWN, (len(moment.qpos), 3)))[:, 2]
         return (upright < TIPPED) | (self._lowest(moment) < BURIED * RADIUS)
 
     def reached(self, moment: Moment) -> Flags:

@@ -7,11 +7,11 @@ from typing import Any, ClassVar, Literal, NamedTuple, get_args, get_origin, get
 
 import mujoco
 import numpy as np
-from rftsim_envs.physics import Array, Flags, Physics
-from rftsim_envs.recipe import Drive, Training
 
-from rftsim import RftsimError
+from rftsim.errors import RftsimError
 from rftsim.sand import make_sand
+from rftsim_envs.physics import Array, Flags
+from rftsim_envs.recipe import Drive, Training
 
 
 class ConfigError(RftsimError, ValueError):
@@ -242,4 +242,5 @@ def to_body(quaternion: Array, vector: Array) -> Array:
 def yaw_of(quaternion: Array) -> Array:
     """Heading of a body with orientation wxyz: angle of its x axis about z [rad], (n,)."""
     w, x, y, z = quaternion.T
-    return np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    angle: Array = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    return angle

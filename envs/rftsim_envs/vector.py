@@ -7,6 +7,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
+
 from rftsim_envs import ground, tasks
 from rftsim_envs.env import Action, spaces
 from rftsim_envs.episodes import Episodes, Observation
@@ -16,8 +17,8 @@ from rftsim_envs.physics import Array, Flags, Many
 class SandVectorEnv(VectorEnv[Observation, Action, NDArray[np.generic]]):
     """A task in many simulations, each with its own sand, stepped together on threads.
 
-    Step by step equal to `SyncVectorEnv` of `SandEnv`s, with `AutoresetMode.SAME_STEP`: an episode that ends is followed
-    by the next one in the same step, and its end is in `final_obs` and `final_info`.
+    Step by step equal to `SyncVectorEnv` of `SandEnv`s, with `AutoresetMode.SAME_STEP`: an episode that ends is
+    followed by the next one in the same step, and its end is in `final_obs` and `final_info`.
 
     Args:
         task: One of `rftsim_envs.TASKS`.
@@ -46,7 +47,9 @@ class SandVectorEnv(VectorEnv[Observation, Action, NDArray[np.generic]]):
         self, *, seed: "int | list[int | None] | None" = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
         """Begin an episode in each simulation; simulation i is seeded with seed + i, or from a list."""
-        seeds = [None if seed is None else seed + i for i in range(self.num_envs)] if not isinstance(seed, list) else seed
+        seeds = (
+            [None if seed is None else seed + i for i in range(self.num_envs)] if not isinstance(seed, list) else seed
+        )
         if len(seeds) != self.num_envs:
             raise ValueError(f"seeds are {len(seeds)}, and environments {self.num_envs}")
         for i, one in enumerate(seeds):

@@ -57,8 +57,8 @@ class Train:
     vary: Settings = ()
     """Several runs, in OUT/key=value/seed-N: settings with each value that they take, ground=sand ground=rigid."""
     ray: str | None = None
-    """Train the runs as tasks on Ray: `local`, or the address of a cluster that shares OUT. A run whose worker dies goes
-    on from its checkpoint; finished ones are not repeated."""
+    """Train the runs as tasks on Ray: `local`, or the address of a cluster that shares OUT. A run whose worker dies
+    goes on from its checkpoint; finished ones are not repeated."""
     json: bool = False
     """Print JSON instead of progress."""
 

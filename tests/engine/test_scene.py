@@ -220,7 +220,9 @@ def test_a_spec_whose_bed_has_no_name_of_its_own_is_unchanged():
 
 def test_geoms_that_others_name():
     """Sensors and contact pairs may name geoms."""
-    ball = '<body name="ball" pos="0 0 .02"><freejoint/><geom name="g" size=".1"/><geom size=".02" pos="0 0 .2"/></body>'
+    ball = (
+        '<body name="ball" pos="0 0 .02"><freejoint/><geom name="g" size=".1"/><geom size=".02" pos="0 0 .2"/></body>'
+    )
     more = '<sensor><framepos objtype="geom" objname="g"/></sensor><contact><pair geom1="g" geom2="f"/></contact>'
     floor = '<geom name="f" type="plane" size="1 1 .1"/>'
     model = load(f"<mujoco><worldbody>{floor}{ball}</worldbody>{more}</mujoco>", SAND, disable_floor=True)
