@@ -12,6 +12,8 @@ from rftsim_envs.physics import Array, Flags
 from rftsim_envs.recipe import Drive, Training, constant
 from rftsim_envs.task import Config, Moment, Task, to_body, yaw_of
 
+WALK: Final = 10.0
+"""Rate of the legs for an action of zero [rad/s]."""
 UNIT: Final = float(np.sqrt(9.81 * HEXAPOD.hip_height))
 """Speed that the reward counts in: sqrt(g h), h the height of the hips [m/s]."""
 
@@ -34,7 +36,7 @@ class HexapodConfig(Config):
 class CLegHexapod(Task):
     """A hexapod of the RHex family, of SandBot's size (2.3 kg, 0.3 m), from rest on one of its two tripods.
 
-    Action, 6 numbers: rates of the legs, -1 to 1 for -30 to 30 rad/s, in the order of `rftsim_models.hexapod.LEGS`:
+    Action, 6 numbers: rates of the legs, -1 to 1 for -10 to 30 rad/s (0 is a walk at 10 rad/s), in the order of `rftsim_models.hexapod.LEGS`:
     left front, middle and rear, right front, middle and rear.
 
     | observation | size | unit |
@@ -58,7 +60,9 @@ class CLegHexapod(Task):
     Settings = HexapodConfig
     edge = parts.AS_MESHED
     naction = len(LEGS)
-    training = Training(steps=1_000_000, n_steps=64, batch_size=1024, layers=(128, 128), log_std_init=-1.0)
+    training = Training(
+        steps=400_000, n_steps=64, batch_size=256, n_epochs=10, learning_rate=5e-4, layers=(128, 128), log_std_init=-1.5
+    )
     config: HexapodConfig
 
     def build(self) -> mujoco.MjSpec:
@@ -74,7 +78,7 @@ class CLegHexapod(Task):
 
     def controls(self, action: Array, moment: Moment) -> Array:
         """See `Task`."""
-        return HEXAPOD.rate * action
+        return WALK + (HEXAPOD.rate - WALK) * action
 
     def observe(self, moment: Moment) -> Array:
         """See `Task`."""
@@ -118,7 +122,7 @@ class CLegHexapod(Task):
 
     def open_loops(self) -> dict[str, Drive]:
         """The alternating tripod gait at constant rates."""
-        return {f"{rate} rad/s": constant(*[rate / HEXAPOD.rate] * len(LEGS)) for rate in range(3, 31, 3)}
+        return {f"{rate} rad/s": constant(*[(rate - WALK) / (HEXAPOD.rate - WALK)] * len(LEGS)) for rate in range(2, 31, 2)}
 
 
 def running_straight(

@@ -13,6 +13,8 @@ from rftsim_envs.task import Config, Moment, Task
 
 RUNNER: Final = dataclasses.replace(FOUR_FLAP_RUNNER, arc=3, flank=6, top=1)
 """The runner in a third of its triangles; steady speeds differ by under 1 %."""
+ROLL: Final = 7.0
+"""Rate of the drive for an action of zero [rad/s]."""
 TOP_RATE: Final = 20.0
 """Of the drive [rad/s]."""
 TORQUE: Final = 20.0
@@ -43,7 +45,7 @@ class RunnerConfig(Config):
 class FourFlapRunner(Task):
     """The runner of [Agarwal] Table 4.3 (10.5 kg, four flaps of 70 mm) in the x-z plane, its rate commanded.
 
-    Action, 1 number: rate of the drive, -1 to 1 for -20 to 20 rad/s; the drive gives up to 20 N m.
+    Action, 1 number: rate of the drive, -1 to 1 for -6 to 20 rad/s; the drive gives up to 20 N m.
 
     | observation | size | unit |
     |---|---|---|
@@ -65,7 +67,9 @@ class FourFlapRunner(Task):
     planar = True
     edge = 2.0
     naction = 1
-    training = Training(steps=400_000, n_steps=64, batch_size=1024, log_std_init=-1.0)
+    training = Training(
+        steps=300_000, n_steps=64, batch_size=256, n_epochs=10, learning_rate=5e-4, log_std_init=-1.5
+    )
     config: RunnerConfig
 
     def build(self) -> mujoco.MjSpec:
@@ -84,7 +88,7 @@ class FourFlapRunner(Task):
 
     def controls(self, action: Array, moment: Moment) -> Array:
         """See `Task`."""
-        return np.hstack([TOP_RATE * action, np.zeros_like(action)])
+        return np.hstack([ROLL + (TOP_RATE - ROLL) * action, np.zeros_like(action)])
 
     def observe(self, moment: Moment) -> Array:
         """See `Task`."""
@@ -99,7 +103,7 @@ class FourFlapRunner(Task):
 
     def open_loops(self) -> dict[str, Drive]:
         """Constant rates."""
-        return {f"{rate:g} rad/s": constant(rate / TOP_RATE) for rate in range(2, 21, 2)}
+        return {f"{rate:g} rad/s": constant((rate - ROLL) / (TOP_RATE - ROLL)) for rate in range(1, 21)}
 
     def measures(self, moment: Moment) -> dict[str, Array]:
         """See `Task`."""
