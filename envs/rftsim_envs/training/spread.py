@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import sys
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Final, TypeVar
 
@@ -45,6 +46,13 @@ def _on_ray(
 ) -> Iterator[Iterator[tuple[str, T]]]:
     import ray  # an extra
 
+    with contextlib.redirect_stdout(sys.stderr):  # Ray prints what happens to its workers
+        yield from _tasks(ray, function, jobs, address)
+
+
+def _tasks(
+    ray: Any, function: Callable[..., T], jobs: Mapping[str, tuple[Any, ...]], address: str
+) -> Iterator[Iterator[tuple[str, T]]]:
     ours = not ray.is_initialized()
     if ours:
         ray.init(
