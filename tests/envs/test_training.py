@@ -26,6 +26,7 @@ from stable_baselines3.common.vec_env import DummyVecEnv
 
 import rftsim
 from rftsim.cli import main
+from rftsim.cli.train import interruptible
 
 TASK = "FourFlapRunner"
 SHORT = {"duration": 0.3}
@@ -215,6 +216,30 @@ def test_a_full_disk_leaves_the_last_checkpoint_whole(tmp_path, capsys, monkeypa
     assert ppo.train(plan, tmp_path) == (500, 248, True)
 
 
+def test_ctrl_c_saves_and_says_how_to_go_on(tmp_path, capsys):
+    arguments = ["train", TASK, "--out", tmp_path, "--set", "duration=0.3", "--envs", 4, "--hyper", "n_steps=32"]
+
+    def interrupt():
+        while not (tmp_path / "progress.csv").is_file():
+            time.sleep(0.02)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    thread = threading.Thread(target=interrupt, daemon=True)
+    thread.start()
+    code, out, _ = call(capsys, *arguments)
+    thread.join()
+    kept = folder.read_progress(tmp_path / "progress.csv")
+    assert code == 130
+    assert f"stopped at {kept[-1]['steps']} steps, saved in" in out
+    assert "the same command goes on from there" in out
+    with interruptible() as stop:
+        assert not stop()
+        signal.raise_signal(signal.SIGINT)
+        assert stop()
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+
+
 def test_two_processes_do_not_train_in_one_folder(tmp_path):
     plan = make_plan(TASK, SHORT, TINY)
     with (
@@ -281,6 +306,26 @@ def read(path, start):
                 found += batch.column("Scalars:scalars").to_pylist()
     values = np.array(found)
     return values[:, 0] if values.shape[1] == 1 else values
+
+
+def test_a_film_has_a_picture_for_each_thirtieth_of_a_second(tmp_path, capsys):
+    av = pytest.importorskip("av")
+    assert call(capsys, "play", "Hopper", "--seconds", 0.5, "--video", tmp_path / "film.mp4")[0] == 0
+    with av.open(str(tmp_path / "film.mp4")) as film:
+        pictures = [frame.to_ndarray(format="rgb24") for frame in film.decode(video=0)]
+    assert len(pictures) == 15
+    assert pictures[0].shape == (540, 960, 3)
+    assert min(picture.std() for picture in pictures) > 5.0
+
+
+def test_what_is_not_installed_is_said(tmp_path, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "av", None)
+    code, _, err = call(capsys, "play", TASK, "--video", tmp_path / "film.mp4")
+    assert (code, "pip install 'rftsim[video]'" in " ".join(err.split())) == (2, True)
+    assert list(tmp_path.iterdir()) == []
+    monkeypatch.setitem(sys.modules, "ray", None)
+    code, _, err = call(capsys, "train", TASK, "--out", tmp_path / "run", "--ray", "local")
+    assert (code, "pip install 'rftsim[ray]'" in " ".join(err.split())) == (2, True)
 
 
 def test_one_of_many_is_recorded_as_one_alone(tmp_path):

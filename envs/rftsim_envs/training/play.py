@@ -58,7 +58,7 @@ def filming(env: SandEnv, path: Path) -> Iterator[Callable[[Mapping[str, Any]], 
     """
     import av  # an extra
 
-    taken, every = 0, 1.0 / FPS
+    taken = 0
     try:
         with av.open(str(path), "w") as container:
             stream = container.add_stream("libx264", rate=round(FPS))
@@ -68,7 +68,7 @@ def filming(env: SandEnv, path: Path) -> Iterator[Callable[[Mapping[str, Any]], 
             def watch(info: Mapping[str, Any]) -> None:
                 nonlocal taken, clock
                 clock += env.config.period
-                while taken * every < clock:
+                while taken < clock * FPS - 1e-6:
                     picture = env.render()
                     assert picture is not None
                     for packet in stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")):

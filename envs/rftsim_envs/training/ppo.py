@@ -90,7 +90,7 @@ def train(
                 report(run.rows[-1])
                 run.save_sometimes()
         run.save()
-        write_whole(folder.policy, folder.checkpoint.read_bytes())
+        run.write(folder.policy, folder.checkpoint.read_bytes())
         folder.write_config(plan, done=True)
         return Trained(run.steps, began, True)
 
@@ -170,7 +170,10 @@ class _Run:
             "return": means.pop("r", ""),
             "length": means.pop("l", ""),
         }
-        self._progress.add(row | {name: means.get(name, "") for name in self._watch.names})
+        try:
+            self._progress.add(row | {name: means.get(name, "") for name in self._watch.names})
+        except TrainingError as error:
+            raise TrainingError(f"{error}. {self._whole()}") from error
         for name, value in means.items():
             self.model.logger.record(f"episode/{name}", float(value))
         self.model.dump_logs()
@@ -194,11 +197,15 @@ class _Run:
         }
         with zipfile.ZipFile(buffer, "a") as archive:
             archive.writestr(MEMBER, json.dumps(kept))
+        self.write(self.folder.checkpoint, buffer.getvalue())
+        self._saved = time.monotonic(), self.steps
+
+    def write(self, path: Path, content: bytes) -> None:
+        """Write a file; an error says what is kept."""
         try:
-            write_whole(self.folder.checkpoint, buffer.getvalue())
+            write_whole(path, content)
         except TrainingError as error:
             raise TrainingError(f"{error}. {self._whole()}") from error
-        self._saved = time.monotonic(), self.steps
 
     def _whole(self) -> str:
         if not self.folder.checkpoint.is_file():
