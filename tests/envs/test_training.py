@@ -30,6 +30,7 @@ from rftsim.cli.train import interruptible
 
 TASK = "FourFlapRunner"
 SHORT = {"duration": 0.3}
+STEPS = tasks.make(TASK, SHORT).config.steps
 TINY = {"steps": 500, "n_envs": 4, "n_steps": 32, "batch_size": 32, "n_epochs": 2, "layers": (8,)}
 
 
@@ -62,7 +63,7 @@ def equal(one, other):
 def test_side_by_side_is_one_by_one():
     def episodes(env):
         env.seed(3)
-        actions = np.random.default_rng(0).uniform(-1.5, 1.5, (70, 3, 1)).astype(np.float32)
+        actions = np.random.default_rng(0).uniform(-1.5, 1.5, (2 * STEPS + 5, 3, 1)).astype(np.float32)
         return [env.reset(), *(env.step(action.clip(-1, 1)) for action in actions)]
 
     one = DummyVecEnv([lambda: gym.make(f"rftsim/{TASK}-v0", max_episode_steps=None, **SHORT)] * 3)
@@ -79,10 +80,10 @@ def test_side_by_side_is_one_by_one():
                 ended += 1
                 np.testing.assert_array_equal(info["terminal_observation"], told["terminal_observation"])
                 assert told["TimeLimit.truncated"] is info["TimeLimit.truncated"] is True
-                assert told["episode"]["l"] == 30
+                assert told["episode"]["l"] == STEPS
     assert ended == 6
-    rewards = np.sum([step[1] for step in steps[:30]], axis=0)
-    np.testing.assert_allclose([info["episode"]["r"] for info in other_steps[29][3]], rewards, rtol=1e-6)
+    rewards = np.sum([step[1] for step in steps[:STEPS]], axis=0)
+    np.testing.assert_allclose([info["episode"]["r"] for info in other_steps[STEPS - 1][3]], rewards, rtol=1e-6)
 
 
 def test_a_run_says_what_was_asked_and_how_it_went(finished):
@@ -95,7 +96,7 @@ def test_a_run_says_what_was_asked_and_how_it_went(finished):
     rows = folder.read_progress(finished / "progress.csv")
     assert [int(row["update"]) for row in rows] == [1, 2, 3, 4]
     assert int(rows[-1]["steps"]) == 500
-    assert float(rows[-1]["length"]) == 30
+    assert float(rows[-1]["length"]) == STEPS
     assert float(rows[-1]["return"]) == pytest.approx(
         float(rows[-1]["reward/speed"]) + float(rows[-1]["reward/power"]), rel=1e-4
     )
@@ -282,12 +283,12 @@ def test_a_recording_reads_back_the_wrench(finished, tmp_path, capsys):
     path = tmp_path / "played.rrd"
     assert call(capsys, "play", finished, "--record", path)[0] == 0
     force, motion = read(path, "/sand/force"), read(path, "/motion/speed")
-    assert len(motion) == 30
+    assert len(motion) == STEPS
     env = SandEnv(TASK, **SHORT)
     env.reset(seed=0)
     actor, wheel = actors.trained(Folder(finished))(env.episodes), env.model.body("wheel").id
     seen = env.episodes.observation()
-    for k in range(30):
+    for k in range(STEPS):
         seen, _, _, _, info = env.step(actor(np.reshape(seen, (1, -1)), 0.0)[0])
         np.testing.assert_array_equal(force[k], rftsim.wrenches(env.model, env.data).force[wheel])
         assert motion[k] == info["speed"]
