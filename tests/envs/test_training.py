@@ -168,7 +168,7 @@ def test_the_command_resumes_refuses_and_says_that_it_is_finished(finished, caps
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["Frog"], "tasks are FourFlapRunner"),
+        (["Frog"], "no task 'Frog'; tasks are"),
         ([TASK, "--set", "colour=3"], "has no setting 'colour'"),
         ([TASK, "--hyper", "speed=3"], "it has steps, n_envs"),
         ([TASK, "--hyper", "gamma=2"], "gamma must be"),
