@@ -14,6 +14,8 @@ from rftsim_envs.task import Config, Moment, Task, to_body, yaw_of
 
 WALK: Final = 10.0
 """Rate of the legs for an action of zero [rad/s]."""
+SWAY: Final = 12.0
+"""How far an action takes it from there [rad/s]."""
 UNIT: Final = float(np.sqrt(9.81 * HEXAPOD.hip_height))
 """Speed that the reward counts in: sqrt(g h), h the height of the hips [m/s]."""
 
@@ -36,7 +38,7 @@ class HexapodConfig(Config):
 class CLegHexapod(Task):
     """A hexapod of the RHex family, of SandBot's size (2.3 kg, 0.3 m), from rest on one of its two tripods.
 
-    Action, 6 numbers: rates of the legs, -1 to 1 for -10 to 30 rad/s (0 is a walk at 10 rad/s), in the order of `rftsim_models.hexapod.LEGS`:
+    Action, 6 numbers: rates of the legs, -1 to 1 for -2 to 22 rad/s (0 is a walk at 10 rad/s), in the order of `rftsim_models.hexapod.LEGS`:
     left front, middle and rear, right front, middle and rear.
 
     | observation | size | unit |
@@ -61,7 +63,7 @@ class CLegHexapod(Task):
     edge = parts.AS_MESHED
     naction = len(LEGS)
     training = Training(
-        steps=400_000, n_steps=64, batch_size=256, n_epochs=10, learning_rate=5e-4, layers=(128, 128), log_std_init=-1.5
+        steps=400_000, n_steps=64, batch_size=256, n_epochs=10, learning_rate=8e-4, layers=(128, 128), log_std_init=-1.5
     )
     config: HexapodConfig
 
@@ -78,7 +80,7 @@ class CLegHexapod(Task):
 
     def controls(self, action: Array, moment: Moment) -> Array:
         """See `Task`."""
-        return WALK + (HEXAPOD.rate - WALK) * action
+        return WALK + SWAY * action
 
     def observe(self, moment: Moment) -> Array:
         """See `Task`."""
@@ -122,7 +124,7 @@ class CLegHexapod(Task):
 
     def open_loops(self) -> dict[str, Drive]:
         """The alternating tripod gait at constant rates."""
-        return {f"{rate} rad/s": constant(*[(rate - WALK) / (HEXAPOD.rate - WALK)] * len(LEGS)) for rate in range(2, 31, 2)}
+        return {f"{rate} rad/s": constant(*[(rate - WALK) / SWAY] * len(LEGS)) for rate in range(1, 23)}
 
 
 def running_straight(

@@ -15,8 +15,8 @@ RUNNER: Final = dataclasses.replace(FOUR_FLAP_RUNNER, arc=3, flank=6, top=1)
 """The runner in a third of its triangles; steady speeds differ by under 1 %."""
 ROLL: Final = 7.0
 """Rate of the drive for an action of zero [rad/s]."""
-TOP_RATE: Final = 20.0
-"""Of the drive [rad/s]."""
+SWAY: Final = 8.0
+"""How far an action takes it from there [rad/s]."""
 TORQUE: Final = 20.0
 """Most that the drive gives [N m]; twice the weight times the outer radius."""
 GAIN: Final = 20.0
@@ -45,12 +45,12 @@ class RunnerConfig(Config):
 class FourFlapRunner(Task):
     """The runner of [Agarwal] Table 4.3 (10.5 kg, four flaps of 70 mm) in the x-z plane, its rate commanded.
 
-    Action, 1 number: rate of the drive, -1 to 1 for -6 to 20 rad/s; the drive gives up to 20 N m.
+    Action, 1 number: rate of the drive, -1 to 1 for -1 to 15 rad/s (0 rolls at 7 rad/s); the drive gives up to 20 N m.
 
     | observation | size | unit |
     |---|---|---|
     | sine and cosine of four times the angle | 2 | - |
-    | rate | 1 | 20 rad/s |
+    | rate | 1 | 15 rad/s |
     | velocity along x and z | 2 | sqrt(g l) = 1.36 m/s |
     | height of the axle | 1 | 0.1 m |
     | last action | 1 | - |
@@ -68,7 +68,7 @@ class FourFlapRunner(Task):
     edge = 2.0
     naction = 1
     training = Training(
-        steps=300_000, n_steps=64, batch_size=256, n_epochs=10, learning_rate=5e-4, log_std_init=-1.5
+        steps=300_000, n_steps=64, batch_size=256, n_epochs=10, learning_rate=8e-4, log_std_init=-1.5
     )
     config: RunnerConfig
 
@@ -88,12 +88,12 @@ class FourFlapRunner(Task):
 
     def controls(self, action: Array, moment: Moment) -> Array:
         """See `Task`."""
-        return np.hstack([ROLL + (TOP_RATE - ROLL) * action, np.zeros_like(action)])
+        return np.hstack([ROLL + SWAY * action, np.zeros_like(action)])
 
     def observe(self, moment: Moment) -> Array:
         """See `Task`."""
         angle, (vx, vz, rate) = 4.0 * moment.qpos[:, 2], moment.qvel.T
-        columns = np.sin(angle), np.cos(angle), rate / TOP_RATE, vx / UNIT, vz / UNIT, 10.0 * moment.qpos[:, 1]
+        columns = np.sin(angle), np.cos(angle), rate / 15.0, vx / UNIT, vz / UNIT, 10.0 * moment.qpos[:, 1]
         return np.column_stack([*columns, moment.action])
 
     def rewards(self, moment: Moment) -> dict[str, Array]:
@@ -103,7 +103,7 @@ class FourFlapRunner(Task):
 
     def open_loops(self) -> dict[str, Drive]:
         """Constant rates."""
-        return {f"{rate:g} rad/s": constant((rate - ROLL) / (TOP_RATE - ROLL)) for rate in range(1, 21)}
+        return {f"{rate:g} rad/s": constant((rate - ROLL) / SWAY) for rate in range(1, 16)}
 
     def measures(self, moment: Moment) -> dict[str, Array]:
         """See `Task`."""
