@@ -67,9 +67,7 @@ class FourFlapRunner(Task):
     planar = True
     edge = 2.0
     naction = 1
-    training = Training(
-        steps=300_000, n_steps=64, batch_size=256, n_epochs=10, learning_rate=8e-4, log_std_init=-1.5
-    )
+    training = Training(steps=300_000, n_steps=64, batch_size=256, n_epochs=10, learning_rate=8e-4, log_std_init=-2.0)
     config: RunnerConfig
 
     def build(self) -> mujoco.MjSpec:

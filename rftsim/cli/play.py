@@ -43,6 +43,8 @@ class Play:
     """Write a Rerun recording, .rrd."""
     video: Path | None = None
     """Write a film, .mp4."""
+    picture: Path | None = None
+    """Write a picture of four moments, with arrows for the sand's traction, .png."""
     json: bool = False
     """Print JSON."""
 
@@ -82,12 +84,17 @@ class Play:
                 film = stack.enter_context(replacing(self.video))
                 watchers.append(stack.enter_context(play.filming(env, film)))
 
+            if self.picture:
+                check_writable(self.picture, ".png")
+                strip = stack.enter_context(replacing(self.picture))
+                watchers.append(stack.enter_context(play.taking_strip(env, strip)))
+
             def watch(info: Mapping[str, Any]) -> None:
                 for one in watchers:
                     one(info)
 
             found = list(play.play(env, maker, self.episodes, self.seed, seconds=self.seconds, watch=watch))
-        written = [str(path) for path in (self.record, self.video) if path]
+        written = [str(path) for path in (self.record, self.video, self.picture) if path]
         if self.json:
             print_json({"env": plan.as_json()["env"], "actions": who, "episodes": found, "written": written})
             return

@@ -5,6 +5,12 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final
 
+import mujoco
+import numpy as np
+from matplotlib import image
+from numpy.typing import NDArray
+
+from rftsim.render import render
 from rftsim_envs.env import SandEnv
 from rftsim_envs.recipe import TrainingError
 from rftsim_envs.tally import Tally
@@ -14,6 +20,10 @@ FPS: Final = 30.0
 """Of films."""
 SIZE: Final = (960, 540)
 """Width and height of films [pixels]."""
+MOMENTS: Final = 4
+"""In a strip."""
+ARROW: Final = 0.3
+"""Length of the strongest traction's arrow in a strip, over the model's extent."""
 
 
 def play(
@@ -47,6 +57,31 @@ def play(
             if out.terminated[0] or out.truncated[0]:
                 break
         yield tally.take(0)
+
+
+@contextlib.contextmanager
+def taking_strip(env: SandEnv, path: Path) -> Iterator[Callable[[Mapping[str, Any]], None]]:
+    """A picture of `MOMENTS` moments of a sand environment, evenly spaced: call what is given after each control step.
+
+    Arrows are the sand's traction.
+    """
+    states: list[NDArray[np.float64]] = []
+    kept, model, camera = mujoco.mjtState.mjSTATE_INTEGRATION, env.model, "follow"
+
+    def watch(info: Mapping[str, Any]) -> None:
+        state = np.empty(mujoco.mj_stateSize(model, kept))
+        mujoco.mj_getState(model, env.data, state, kept)
+        states.append(state)
+
+    yield watch
+    data, pictures = mujoco.MjData(model), []
+    for k in np.linspace(0, len(states) - 1, MOMENTS).round().astype(int):
+        mujoco.mj_setState(model, data, states[k], kept)
+        mujoco.mj_forward(model, data)
+        width, height = SIZE
+        length = ARROW * float(model.stat.extent)
+        pictures.append(render(model, data, camera=camera, width=width // 2, height=height, arrows=length))
+    image.imsave(path, np.hstack(pictures))
 
 
 @contextlib.contextmanager
