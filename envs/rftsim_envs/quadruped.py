@@ -9,7 +9,8 @@ from rftsim_models import parts
 from rftsim_models.quadruped import FEET, QUADRUPED, RANGES, build_quadruped
 
 from rftsim_envs.physics import Array, Flags
-from rftsim_envs.task import Config, Moment, Task, to_body, yaw_of
+from rftsim_envs.recipe import Training
+from rftsim_envs.task import Config, ConfigError, Moment, Task, to_body, yaw_of
 
 REACH: Final = np.tile([0.15, 0.35, 0.35], 4)
 """Offsets of abduction, hip and knee from the standing pose for an action of 1 [rad]."""
@@ -30,21 +31,33 @@ class QuadrupedConfig(Config):
         forward: Range of the commanded velocity ahead, drawn for each episode [m/s].
         sideways: Range of that to the left [m/s].
         turning: Range of the commanded yaw rate [rad/s].
-        width: Error of the velocity at which its reward has fallen to 1/e [m/s].
-        turning_width: Error of the yaw rate at which its reward has fallen to 1/e [rad/s].
+        spread: Error of the velocity at which its reward has fallen to 1/e [m/s].
+        turning_spread: Error of the yaw rate at which its reward has fallen to 1/e [rad/s].
         energy: Weight of the power in the reward.
         haste: Weight of the actions' changes in the reward.
         tilt: Weight of the torso's lean in the reward.
     """
 
+    sand: str = "close-poppy-seeds"
+    period: float = 0.04
     forward: tuple[float, float] = (0.2, 0.6)
     sideways: tuple[float, float] = (-0.1, 0.1)
     turning: tuple[float, float] = (-0.2, 0.2)
-    width: float = 0.25
-    turning_width: float = 0.5
+    spread: float = 0.25
+    turning_spread: float = 0.5
     energy: float = 0.2
     haste: float = 0.02
     tilt: float = 2.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("forward", "sideways", "turning"):
+            low, high = getattr(self, name)
+            if not -3.0 <= low <= high <= 3.0:
+                raise ConfigError(f"{name} must be a range within -3 and 3, low to high, not {(low, high)}")
+        for name in ("spread", "turning_spread"):
+            if not getattr(self, name) > 0.0:
+                raise ConfigError(f"{name} must be positive, not {getattr(self, name):g}")
 
 
 class Quadruped(Task):
@@ -64,7 +77,7 @@ class Quadruped(Task):
     | rates of the joints | 12 | 10 rad/s |
     | last action | 12 | - |
 
-    Reward per second: exp(-|v - commanded v|^2 / width^2) + exp(-(w - commanded w)^2 / turning_width^2) / 2
+    Reward per second: exp(-|v - commanded v|^2 / spread^2) + exp(-(w - commanded w)^2 / turning_spread^2) / 2
     - energy P / (m g 1 m/s) - haste |a - last a|^2 - tilt (g_x^2 + g_y^2), v the velocity over the ground in the
     heading's axes and w the yaw rate, both means over the control step as is the servos' positive power P, and g the
     direction of gravity in the torso's axes.
@@ -80,6 +93,16 @@ class Quadruped(Task):
     edge = parts.AS_MESHED
     ncommand = 3
     naction = 12
+    training = Training(
+        steps=1_000_000,
+        n_steps=48,
+        batch_size=768,
+        n_epochs=4,
+        gamma=0.98,
+        learning_rate=5e-4,
+        layers=(128, 128),
+        log_std_init=-1.2,
+    )
     config: QuadrupedConfig
 
     def build(self) -> mujoco.MjSpec:
@@ -121,8 +144,8 @@ class Quadruped(Task):
         """See `Task`."""
         c, down = self.config, to_body(moment.qpos[:, 3:7], moment.gravity)
         return {
-            "velocity": closeness(_velocity(moment) - moment.command[:, :2], c.width),
-            "turning": 0.5 * closeness(_turning(moment)[:, None] - moment.command[:, 2:], c.turning_width),
+            "velocity": closeness(_velocity(moment) - moment.command[:, :2], c.spread),
+            "turning": 0.5 * closeness(_turning(moment)[:, None] - moment.command[:, 2:], c.turning_spread),
             "power": -c.energy * moment.power / self._weight,
             "haste": -c.haste * ((moment.action - moment.last) ** 2).sum(axis=1),
             "tilt": -c.tilt * (down[:, :2] ** 2).sum(axis=1),
@@ -151,9 +174,9 @@ class Quadruped(Task):
         return _velocity(moment)[:, 0]
 
 
-def closeness(error: Array, width: float) -> Array:
-    """1 where the error (n, k) is zero, 1/e where it is as large as the width."""
-    value: Array = np.exp(-(error**2).sum(axis=1) / width**2)
+def closeness(error: Array, spread: float) -> Array:
+    """1 where the error (n, k) is zero, 1/e where it is as large as the spread."""
+    value: Array = np.exp(-(error**2).sum(axis=1) / spread**2)
     return value
 
 

@@ -9,7 +9,8 @@ from rftsim_models import parts
 from rftsim_models.rover import ROVER, WHEELS, build_rover
 
 from rftsim_envs.physics import Array, Flags
-from rftsim_envs.task import Config, Moment, Task, to_body, yaw_of
+from rftsim_envs.recipe import Training
+from rftsim_envs.task import Config, ConfigError, Moment, Task, to_body, yaw_of
 
 RADIUS: Final = ROVER.wheel.outer_radius
 TOP_SPEED: Final = ROVER.rate * RADIUS
@@ -48,6 +49,13 @@ class RoverConfig(Config):
     digging: float = 0.5
     energy: float = 0.5
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not ARRIVED < self.distance[0] <= self.distance[1]:
+            raise ConfigError(f"distance must be a range above {ARRIVED} m, low to high, not {self.distance}")
+        if not 0.0 <= self.sector_deg <= 180.0:
+            raise ConfigError(f"sector_deg must be between 0 and 180, not {self.sector_deg:g}")
+
 
 class Rover(Task):
     """A rover of Sojourner's size (11.2 kg, six grousered wheels on rockers and bogies), steered by skidding.
@@ -84,6 +92,9 @@ class Rover(Task):
     edge = parts.AS_MESHED
     ncommand = 2
     naction = 2
+    training = Training(
+        steps=300_000, n_envs=32, n_steps=64, batch_size=256, n_epochs=10, learning_rate=5e-4, log_std_init=-0.7
+    )
     config: RoverConfig
 
     def build(self) -> mujoco.MjSpec:

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from rftsim_envs import SandEnv, SandVectorEnv
+from rftsim_envs import ConfigError, SandEnv, SandVectorEnv
 from rftsim_envs.grouser_wheel import GROUSER_WHEEL, RADIUS, slip, tracking
 from rftsim_envs.quadruped import Quadruped, closeness
 from rftsim_envs.rover import BURIED, Rover, digging, progress
@@ -39,7 +39,7 @@ def test_quadruped_that_stands_as_asked_gets_all_but_nothing_less(ground):
     """1 + 1/2 per second, less what settling costs."""
     zero = {"forward": (0, 0), "sideways": (0, 0), "turning": (0, 0)}
     env = SandVectorEnv("Quadruped", 2, ground=ground, duration=2.0, **zero)
-    total, info = run(env, still(env), 100)
+    total, info = run(env, still(env), 50)
     np.testing.assert_allclose(total, 1.5 * 2.0, rtol=0.02)
     assert (info["error"] < 1e-3).all()
     assert (info["tilt"] < 0.02).all()
@@ -136,31 +136,21 @@ def test_pure_rewards():
     np.testing.assert_allclose(closeness(np.array([[0.15, 0.2], [0.0, 0.0]]), 0.25), [np.exp(-1), 1.0])
 
 
-@pytest.mark.parametrize("name", ["GrouserWheel", "Quadruped", "Rover"])
-@pytest.mark.parametrize("ground", GROUNDS)
-def test_batch_is_bit_equal_to_single(name, ground):
-    settings = {"ground": ground, "slope_deg": 8.0, "strength": (0.5, 2.0), "friction": (0.7, 1.3), "duration": 0.2}
-    many, ones = SandVectorEnv(name, 2, **settings), [SandEnv(name, **settings) for _ in range(2)]
-    seen = many.reset(seed=3)[0]
-    np.testing.assert_array_equal(seen, [one.reset(seed=3 + i)[0] for i, one in enumerate(ones)])
-    rng = np.random.default_rng(0)
-    for _ in range(round(0.2 / many.config.period)):
-        action = rng.uniform(-1.0, 1.0, many.action_space.shape)
-        observation, reward, terminated, truncated, info = many.step(action)
-        for i, one in enumerate(ones):
-            alone = one.step(action[i])
-            final = info["final_obs"][i] if terminated[i] or truncated[i] else observation[i]
-            np.testing.assert_array_equal(final, alone[0])
-            assert (reward[i], terminated[i], truncated[i]) == alone[1:4]
-    assert truncated.all()
-
-
-@pytest.mark.parametrize(("name", "size"), [("GrouserWheel", 8), ("Quadruped", 48), ("Rover", 26)])
-def test_observation_is_as_tabulated(name, size):
-    env = SandEnv(name)
-    rows = [line.split("|") for line in (type(env.task).__doc__ or "").splitlines() if line.strip().startswith("|")]
-    counted = sum(int(row[2]) for row in rows[2:] if ", if " not in row[1])
-    assert counted == size == env.observation_space.shape[0]
+@pytest.mark.parametrize(
+    ("name", "settings", "words"),
+    [
+        ("GrouserWheel", {"speed": (0.5, 0.1)}, "speed must be a range"),
+        ("GrouserWheel", {"drawbar": (-1, 1)}, "drawbar must be a range"),
+        ("GrouserWheel", {"spread": 0}, "spread must be positive"),
+        ("Quadruped", {"forward": (1, 0)}, "forward must be a range"),
+        ("Quadruped", {"turning_spread": 0}, "turning_spread must be positive"),
+        ("Rover", {"distance": (0.1, 1)}, "distance must be a range above"),
+        ("Rover", {"sector_deg": 200}, "sector_deg must be between"),
+    ],
+)
+def test_settings_that_cannot_be(name, settings, words):
+    with pytest.raises(ConfigError, match=words):
+        SandEnv(name, **settings)
 
 
 def test_quadruped_speed_is_in_its_own_heading():
