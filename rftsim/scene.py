@@ -22,7 +22,8 @@ from rftsim.sand import FreeSurface, Sand, make_sand
 from rftsim.surface import Array, Surface, Wheel
 
 _GEOM = mujoco.mjtGeom
-SAND_RGBA = (0.76, 0.70, 0.50, 0.55)
+SAND_RGBA = (1.0, 1.0, 1.0, 0.6)
+GRAIN_RGB = ((0.78, 0.72, 0.52), (0.66, 0.59, 0.41))
 
 
 class Bed(NamedTuple):
@@ -194,8 +195,10 @@ def _check_names(spec: mujoco.MjSpec, name: str, surfaces: Mapping[str, Surface]
     taken = {sensor.name for sensor in spec.sensors} & {f"{body}_sand" for body in surfaces} if sensors else set()
     if taken:
         raise SceneError(f"the model has a sensor {min(taken)!r} already: rename it, or pass sensors=False")
-    if draw and f"{name}_surface" in {geom.name for geom in spec.geoms}:
-        raise SceneError(f"the model has a geom '{name}_surface' already: rename it, or pass draw=False")
+    drawn = [("geom", spec.geoms), ("texture", spec.textures), ("material", spec.materials)]
+    for kind, elements in drawn if draw else ():
+        if f"{name}_surface" in {element.name for element in elements}:
+            raise SceneError(f"the model has a {kind} '{name}_surface' already: rename it, or pass draw=False")
 
 
 def _check_options(model: mujoco.MjModel, sand: Sand) -> None:
@@ -371,6 +374,19 @@ def _draw(spec: mujoco.MjSpec, name: str, free_surface: FreeSurface) -> None:
     half = 0.5 * math.acos(min(normal[2], 1.0))
     length = math.hypot(normal[0], normal[1]) or 1.0
     quat = [math.cos(half), -math.sin(half) * normal[1] / length, math.sin(half) * normal[0] / length, 0.0]
+    spec.add_texture(
+        name=f"{name}_surface",
+        type=mujoco.mjtTexture.mjTEXTURE_2D,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_FLAT,
+        mark=mujoco.mjtMark.mjMARK_RANDOM,
+        random=0.15,
+        rgb1=GRAIN_RGB[0],
+        markrgb=GRAIN_RGB[1],
+        width=64,
+        height=64,
+    )
+    grains = spec.add_material(name=f"{name}_surface", texrepeat=[4, 4], texuniform=True)
+    grains.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = f"{name}_surface"
     spec.worldbody.add_geom(
         name=f"{name}_surface",
         type=_GEOM.mjGEOM_PLANE,
@@ -379,5 +395,6 @@ def _draw(spec: mujoco.MjSpec, name: str, free_surface: FreeSurface) -> None:
         quat=quat,
         contype=0,
         conaffinity=0,
+        material=f"{name}_surface",
         rgba=SAND_RGBA,
     )

@@ -38,8 +38,8 @@ class HexapodConfig(Config):
 class CLegHexapod(Task):
     """A hexapod of the RHex family, of SandBot's size (2.3 kg, 0.3 m), from rest on one of its two tripods.
 
-    Action, 6 numbers: rates of the legs, -1 to 1 for -2 to 22 rad/s (0 is a walk at 10 rad/s), in the order of `rftsim_models.hexapod.LEGS`:
-    left front, middle and rear, right front, middle and rear.
+    Action, 6 numbers: rates of the legs, -1 to 1 for -2 to 22 rad/s (0 is a walk at 10 rad/s), in the order of
+    `rftsim_models.hexapod.LEGS`: left front, middle and rear, right front, middle and rear.
 
     | observation | size | unit |
     |---|---|---|

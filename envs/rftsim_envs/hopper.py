@@ -62,8 +62,8 @@ class Hopper(Task):
     | last action | 3 | - |
 
     Reward per second: 1 - |v - command| / command, at least -1, + 0.2 - energy P / (m g 1 m/s)
-    - smooth |change of action|^2, v the speed along x and P the motors' positive power. The episode ends early where the
-    hopper has fallen: hip below 0.22 m, or torso leaning by more than 0.9 rad.
+    - smooth |change of action|^2, v the speed along x and P the motors' positive power.
+    The episode ends early where the hopper has fallen: hip below 0.22 m, or torso leaning by more than 0.9 rad.
 
     `info`: `speed` and `command` [m/s], `height` of the hip [m], and what all tasks tell.
     """
