@@ -46,7 +46,6 @@ class Episodes:
         self.ground, self._limits = Ground(physics, task.config), Limits(physics)
         self._qpos, self._qvel = physics.field("qpos"), physics.field("qvel")
         self._ctrl, self._sensors = physics.field("ctrl"), physics.field("sensordata")
-        self._force, self._rate = physics.field("actuator_force"), physics.field("actuator_velocity")
         self._weight = float(physics.model.body_mass.sum() * np.linalg.norm(physics.model.opt.gravity))
         self._command, self._action = np.zeros((n, task.ncommand)), np.zeros((n, task.naction))
         self._count, self._energy, self._distance = np.zeros(n, dtype=int), np.zeros(n), np.zeros(n)
@@ -91,13 +90,10 @@ class Episodes:
         if wanted.shape != self._action.shape or not np.isfinite(wanted).all():
             raise ValueError(f"the action must be finite and of shape {self._action.shape}, not {action!r}")
         task, period = self.task, self.task.config.period
-        before, power = self._qpos.copy(), np.zeros(self.physics.n)
+        before = self._qpos.copy()
         self._last, self._action = self._action, np.clip(wanted, -1.0, 1.0)
-        self._ctrl[:] = task.controls(self._action, self._moment(before, power))
-        for _ in range(task.config.substeps):
-            self.physics.step()
-            power += np.maximum(self._force * self._rate, 0.0).sum(axis=1)
-        power /= task.config.substeps
+        self._ctrl[:] = task.controls(self._action, self._moment(before, np.zeros(len(before))))
+        power = self.physics.step(task.config.substeps)
         moment, diverged = self._moment(before, power), self.physics.failed()
         terms, measures = task.rewards(moment), task.measures(moment)
         reached = task.reached(moment) & ~diverged
