@@ -427,3 +427,22 @@ def test_on_ray_each_run_ends_once_though_a_worker_dies(tmp_path, capsys):
     before = {path: path.stat().st_mtime_ns for path in tmp_path.glob("*/policy.zip")}
     assert call(capsys, *arguments)[0] == 0
     assert before == {path: path.stat().st_mtime_ns for path in tmp_path.glob("*/policy.zip")}
+
+
+@pytest.mark.slow
+def test_throughput(capsys):
+    """PPO on 64 simulations in a batch against 8 environments in a DummyVecEnv: three times is the aim."""
+    rates = {}
+    with ppo.torch_threads(ppo.THREADS):
+        for name, env, n_steps in (
+            ("batch", SandVecEnv("CLegHexapod", 64), 64),
+            ("single", DummyVecEnv([lambda: SandEnv("CLegHexapod")] * 8), 512),
+        ):
+            model = PPO("MlpPolicy", env, n_steps=n_steps, batch_size=256, n_epochs=10, seed=0, device="cpu",
+                        policy_kwargs={"net_arch": [128, 128], "log_std_init": -2.3})  # fmt: skip
+            started = time.perf_counter()
+            model.learn(8192)
+            rates[name] = 8192 / (time.perf_counter() - started)
+    with capsys.disabled():
+        print({name: round(rate) for name, rate in rates.items()}, f"ratio {rates['batch'] / rates['single']:.2f}")
+    assert rates["batch"] > 2.0 * rates["single"]

@@ -82,7 +82,7 @@ def train(
         env = SandVecEnv(plan.task, plan.training.n_envs, threads, **plan.settings)
         run = _Run(plan, env, folder, tensorboard)
         began = run.resume()
-        with _torch_threads(THREADS):
+        with torch_threads(THREADS):
             for k in range(run.updates, len(updates)):
                 if not run.update(updates[k], 1.0 - k / len(updates), stop):
                     run.save()
@@ -269,7 +269,8 @@ def _read(checkpoint: Path) -> dict[str, Any]:
 
 
 @contextlib.contextmanager
-def _torch_threads(count: int) -> Iterator[None]:
+def torch_threads(count: int) -> Iterator[None]:
+    """Let torch use so many threads, for a while."""
     before = torch.get_num_threads()
     torch.set_num_threads(count)
     try:
