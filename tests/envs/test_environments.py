@@ -171,9 +171,9 @@ def test_picture_shows_the_sand(task):
 
 @pytest.mark.slow
 def test_a_thousand_random_episodes():
-    """None diverges, none is reset behind one's back: time only grows within an episode."""
+    """Of 2 s: none diverges, none is reset behind one's back: time only grows within an episode."""
     for task in TASKS:
-        envs = SandVectorEnv(task, num_envs=32, **VARIED)
+        envs = SandVectorEnv(task, num_envs=32, duration=2.0, **VARIED)
         envs.reset(seed=0)
         rng, ended = np.random.default_rng(0), 0
         clock = envs.episodes.physics.field("time").copy()
@@ -186,7 +186,8 @@ def test_a_thousand_random_episodes():
             now = envs.episodes.physics.field("time")
             assert np.isfinite(observation).all()
             assert np.isfinite(reward).all()
-            assert not info["diverged"].any()
+            for told in (info, info.get("final_info", {})):
+                assert not np.any(told.get("diverged", False))
             assert (done | (now > clock)).all()
             clock = now.copy()
 
