@@ -22,6 +22,8 @@ SAND_FIELDS: Final = (
 )
 """Entries of a packed sand, in order."""
 SAND_SIZE: Final = len(SAND_FIELDS)
+STRENGTHS: Final = [SAND_FIELDS.index(name) for name in ("xi_n", "zeta")]
+"""Where a packed sand has what scales its force, under the 3D laws and under the 2D ones."""
 
 HEADER: Final = 16
 """Numbers before the triangles of a packed surface.

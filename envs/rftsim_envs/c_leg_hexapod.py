@@ -103,12 +103,11 @@ class CLegHexapod(Task):
     def rewards(self, moment: Moment) -> dict[str, Array]:
         """See `Task`."""
         told = self.measures(moment)
-        weight = HEXAPOD.mass * 9.81
         return running_straight(
             told["speed"] / UNIT,
             told["drift"] / UNIT,
             told["heading"],
-            moment.power / (weight * UNIT),
+            moment.power / (self.weight * UNIT),
             self.config.straight,
             self.config.energy,
         )

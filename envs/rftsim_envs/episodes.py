@@ -46,7 +46,6 @@ class Episodes:
         self.ground, self._limits = Ground(physics, task.config), Limits(physics)
         self._qpos, self._qvel = physics.field("qpos"), physics.field("qvel")
         self._ctrl, self._sensors = physics.field("ctrl"), physics.field("sensordata")
-        self._weight = float(physics.model.body_mass.sum() * np.linalg.norm(physics.model.opt.gravity))
         self._command, self._action = np.zeros((n, task.ncommand)), np.zeros((n, task.naction))
         self._count, self._energy, self._distance = np.zeros(n, dtype=int), np.zeros(n), np.zeros(n)
         self._last = self._action.copy()
@@ -103,7 +102,7 @@ class Episodes:
         info: dict[str, NDArray[np.generic]] = {f"reward/{name}": term * period for name, term in terms.items()}
         reward = np.where(diverged, 0.0, sum(info.values()))
         info |= measures | {"power": power, "diverged": diverged, "reached": reached} | self._limits.measures()
-        info["cost_of_transport"] = self._energy / (self._weight * np.maximum(self._distance, 1e-3))
+        info["cost_of_transport"] = self._energy / (task.weight * np.maximum(self._distance, 1e-3))
         terminated = task.failed(moment) | reached | diverged
         truncated = (self._count >= task.config.steps) & ~terminated
         return Outcome(self._observe(moment), reward, terminated, truncated, info)

@@ -72,11 +72,7 @@ class FourFlapRunner(Task):
 
     def build(self) -> mujoco.MjSpec:
         """See `Task`."""
-        spec = build_wheel(RUNNER, 0.0)
-        servo = spec.actuator("rate")
-        servo.set_to_velocity(kv=GAIN)
-        servo.forcelimited, servo.forcerange = True, [-TORQUE, TORQUE]
-        return spec
+        return build_wheel(RUNNER, 0.0, gain=GAIN, torque_limit=TORQUE)
 
     def start(self, rng: np.random.Generator, qpos: Array, qvel: Array) -> Array:
         """At rest on the sand, at any angle."""
@@ -96,8 +92,7 @@ class FourFlapRunner(Task):
 
     def rewards(self, moment: Moment) -> dict[str, Array]:
         """See `Task`."""
-        weight = float(self.model.body_mass.sum() * np.linalg.norm(self.model.opt.gravity))
-        return running(self.speed(moment), moment.power, UNIT, weight, self.config.energy)
+        return running(self.speed(moment), moment.power, UNIT, self.weight, self.config.energy)
 
     def open_loops(self) -> dict[str, Drive]:
         """Constant rates."""

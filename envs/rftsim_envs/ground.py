@@ -6,7 +6,7 @@ from typing import Final, NamedTuple
 import mujoco
 import numpy as np
 
-from rftsim.packed import SAND_FIELDS
+from rftsim.packed import SAND_FIELDS, STRENGTHS
 from rftsim.readout import instances
 from rftsim.scene import add_sand
 from rftsim_envs.physics import Array, Physics
@@ -102,9 +102,7 @@ class Ground:
         if self._rigid:
             self._sliding[i, 0] = drawn.friction * self._before[0]
         else:
-            for name in ("xi_n", "zeta"):
-                k = SAND_FIELDS.index(name)
-                self._sand[i, k] = drawn.strength * self._before[k]
+            self._sand[i, STRENGTHS] = drawn.strength * self._before[STRENGTHS]
             k = SAND_FIELDS.index("mu_surf")
             self._sand[i, k] = drawn.friction * self._before[k]
         x, y = drawn.downhill

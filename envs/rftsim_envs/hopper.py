@@ -82,11 +82,6 @@ class Hopper(Task):
         """See `Task`."""
         return build_hopper()
 
-    def prepare(self, model: mujoco.MjModel) -> None:
-        """See `Task`."""
-        super().prepare(model)
-        self._weight = float(model.body_mass.sum() * np.linalg.norm(model.opt.gravity))
-
     def start(self, rng: np.random.Generator, qpos: Array, qvel: Array) -> Array:
         """Near the crouch, nearly at rest; the command is drawn."""
         qpos[2:] += rng.uniform(-0.03, 0.03, size=4)
@@ -116,7 +111,7 @@ class Hopper(Task):
         """See `Task`."""
         return hopping(
             self.speed(moment) / moment.command[:, 0],
-            moment.power / self._weight,
+            moment.power / self.weight,
             moment.action - moment.last,
             self.config.energy,
             self.config.smooth,

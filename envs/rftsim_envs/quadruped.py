@@ -113,7 +113,6 @@ class Quadruped(Task):
         """See `Task`."""
         super().prepare(model)
         self._stance: Array = model.key_ctrl[0].copy()
-        self._weight = float(model.body_mass.sum() * np.linalg.norm(model.opt.gravity))
 
     def start(self, rng: np.random.Generator, qpos: Array, qvel: Array) -> Array:
         """Standing, joints off by up to 0.05 rad."""
@@ -146,7 +145,7 @@ class Quadruped(Task):
         return {
             "velocity": closeness(_velocity(moment) - moment.command[:, :2], c.spread),
             "turning": 0.5 * closeness(_turning(moment)[:, None] - moment.command[:, 2:], c.turning_spread),
-            "power": -c.energy * moment.power / self._weight,
+            "power": -c.energy * moment.power / self.weight,
             "haste": -c.haste * ((moment.action - moment.last) ** 2).sum(axis=1),
             "tilt": -c.tilt * (down[:, :2] ** 2).sum(axis=1),
         }

@@ -110,7 +110,6 @@ class Rover(Task):
         super().prepare(model)
         self._rates = [model.joint(wheel).dofadr[0] for wheel in WHEELS]
         self._heights = [model.sensor(f"{wheel}_hub").adr[0] + 2 for wheel in WHEELS]
-        self._weight = float(model.body_mass.sum() * np.linalg.norm(model.opt.gravity))
 
     def start(self, rng: np.random.Generator, qpos: Array, qvel: Array) -> Array:
         """At rest on the ground; the command is the goal's place."""
@@ -148,7 +147,7 @@ class Rover(Task):
         return {
             "progress": progress(moment.before[:, :2], moment.qpos[:, :2], moment.command) / moment.period / TOP_SPEED,
             "arrival": np.where(self.reached(moment), c.arrival / moment.period, 0.0),
-            "power": -c.energy * moment.power / (self._weight * TOP_SPEED),
+            "power": -c.energy * moment.power / (self.weight * TOP_SPEED),
             "digging": -c.digging * digging(slip_speed, speed) / TOP_SPEED,
         }
 

@@ -142,6 +142,7 @@ class Task(abc.ABC):
         planar: Whether the robot moves in the x-z plane.
         edge: Longest edge of a felt triangle [m]; None for `add_sand`'s.
         ncommand: Numbers in a command.
+        weight: Of the robot, once it is prepared [N].
         training: How a policy is trained.
     """
 
@@ -165,7 +166,7 @@ class Task(abc.ABC):
 
     def prepare(self, model: mujoco.MjModel) -> None:
         """Look up in the compiled model what the methods below need."""
-        self.model = model
+        self.weight = float(model.body_mass.sum() * np.linalg.norm(model.opt.gravity))
 
     @property
     @abc.abstractmethod

@@ -152,7 +152,7 @@ def put_sand(tree: etree._Element, assets: Mapping[str, bytes], options: Mapping
 
 
 def _bodies_alone(tree: etree._Element, assets: Mapping[str, bytes]) -> mujoco.MjSpec:
-    """What the sand reads of a document, without what refers to its elements: add_sand renames geoms for a while."""
+    """What the sand reads of a document, without sensors and numerics, which stand in it already, and what moves it."""
     document = copy.deepcopy(tree)
     for section in ("sensor", "contact", "tendon", "actuator", "equality", "keyframe", "custom"):
         for element in document.findall(section):

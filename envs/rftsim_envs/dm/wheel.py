@@ -14,7 +14,7 @@ from dm_env import specs
 from numpy.typing import NDArray
 from rftsim_models.wheels import CARRIAGE, WHEEL, WheelParameters, build_wheel
 
-from rftsim.packed import SAND_FIELDS
+from rftsim.packed import STRENGTHS
 from rftsim.readout import instances, wrenches
 from rftsim.sand import Sand
 from rftsim.scene import add_sand
@@ -148,7 +148,7 @@ def set_strength(physics: Physics, sand: Sand, factor: float) -> None:
     assert sand.xi_n is not None
     assert sand.zeta is not None
     for bed in instances(physics.model.ptr):
-        bed.sand[[SAND_FIELDS.index("xi_n"), SAND_FIELDS.index("zeta")]] = factor * sand.xi_n, factor * sand.zeta
+        bed.sand[STRENGTHS] = factor * sand.xi_n, factor * sand.zeta
 
 
 def make_physics(parameters: WheelParameters, ground: Ground, top_rate: float) -> Physics:
