@@ -160,6 +160,7 @@ def _result(plate: Plate, found: PlateForce) -> dict[str, Any]:
         "young_Pa": plate.material.young,
         "force": found.force.tolist(),
         "alpha_N_m3": found.alpha.tolist(),
+        "alpha_face_N_m3": (found.face / (plate.area * plate.z)).tolist(),
         "depth_m": found.depth,
         "noise": found.noise,
         "travel_m": [float(f"{x:.6g}") for x in history.travel[some]],

@@ -52,6 +52,7 @@ class Drag:
                 speed=speed,
                 cells=self.cells,
                 bed=2.5,
+                buried=2.5,
             )
             for depth in self.depths
             for speed in self.speeds
@@ -87,7 +88,7 @@ def drag(study: Drag, watch: Callable[[Simulation, float], None] | None = None) 
             def inner(sim: Simulation, share: float, i: int = i) -> None:
                 watch(sim, (i + share) / len(plates))
 
-        runs.append(measure(plate, inner, buried=2.5))
+        runs.append(measure(plate, inner))
     depth, speed = np.array([plate.z for plate in plates]), np.array([plate.speed for plate in plates])
     force = np.array([run.force for run in runs])
     basis = np.column_stack([depth, study.rho * study.length * speed**2])

@@ -24,9 +24,6 @@ from rftsim_mpm.simulation import Simulation
 Array = NDArray[np.float64]
 Watch = Callable[[Simulation, float], None]
 
-BURIED = 0.6
-"""Travel before the reading of a plate that starts in the sand [plate lengths]."""
-
 
 @dataclasses.dataclass(frozen=True)
 class Plate:
@@ -54,14 +51,20 @@ class Plate:
     """Depth of the leading face's centre at which the force is read [m]; 0.4 of the length."""
     speed: float = 0.1
     """[m/s]."""
+    buried: float = 0.6
+    """Travel before the reading of a plate that starts in the sand [plate lengths]."""
     cells: float = 10.0
     """Cells per plate length."""
     young: float | None = None
-    """Young's modulus [Pa]; by default rho g z N_q / E is 0.5 % at the reading."""
+    """Young's modulus [Pa]; by default from `softness`."""
+    softness: float = 0.005
+    """Strain of the sand under the bearing pressure of the reading's depth, rho g z N_q / E."""
     courant: float = 0.3
     """Time step, in cells per wave."""
     shift: float = 0.0
     """Place of the plate on the grid, along x and y [cells]."""
+    early: float = 0.0
+    """How far outside its surface the plate acts [cells]; 1 is what raw contact of two velocity fields does."""
     bed: float = 1.0
     """Factor on the margins of sand around the plate."""
     ppc: int = 2
@@ -78,7 +81,7 @@ class Plate:
             raise MpmError("psi needs dim 3")
         if not -90.0 <= self.beta <= 90.0 or not -90.0 <= self.gamma <= 90.0 or not -180.0 <= self.psi <= 180.0:
             raise MpmError("beta and gamma must be in [-90, 90] degrees and psi in [-180, 180]")
-        for name in ("rho", "length", "speed", "bed", "courant", "mu_int"):
+        for name in ("rho", "length", "speed", "bed", "courant", "mu_int", "softness", "buried"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0.0):
                 raise MpmError(f"{name} must be positive and finite, not {getattr(self, name):g}")
         for name in ("thickness", "depth", "young"):
@@ -89,6 +92,8 @@ class Plate:
             raise MpmError(f"cells must be in [4, 200], not {self.cells:g}")
         if not (math.isfinite(self.mu_surf) and self.mu_surf >= 0.0):
             raise MpmError(f"mu_surf must be zero or positive, not {self.mu_surf:g}")
+        if not 0.0 <= self.early <= 2.0:
+            raise MpmError(f"early must be in [0, 2] cells, not {self.early:g}")
         if self.ppc < 1 or self.xpic < 0:
             raise MpmError("ppc must be at least 1 and xpic at least 0")
         if self.thick < 1.06 * self.dx:
@@ -124,7 +129,7 @@ class Plate:
     @property
     def material(self) -> Material:
         """The sand."""
-        young = self.young or stiffness(self.rho, 9.81, self.z, self.mu_int, 0.005)
+        young = self.young or stiffness(self.rho, 9.81, self.z, self.mu_int, self.softness)
         return Material.of_density(self.mu_int, self.rho, young)
 
     @property
@@ -133,6 +138,12 @@ class Plate:
         g = math.radians(self.gamma)
         along = [math.cos(g), 0.0, -math.sin(g)]
         return np.array(along if self.dim == 3 else along[::2]).round(15)  # cos 90 degrees is nothing
+
+    @property
+    def leading(self) -> Array:
+        """Outward normal of the face that leads, of the lower one where the plate moves along itself, (dim,)."""
+        up: Array = self.rotation[:, -1]
+        return up if up @ self.direction > 1e-12 else -up
 
     @property
     def rotation(self) -> Array:
@@ -150,6 +161,8 @@ class PlateForce(NamedTuple):
     """Of the sand on the plate at the reading, (dim,) [N, in the plane N/m]."""
     alpha: Array
     """Force per area and depth, (dim,) [N/m^3]."""
+    face: Array
+    """Force on the leading face alone, without edges and back, (dim,)."""
     depth: float
     """Of the leading face's centre [m]."""
     noise: float
@@ -163,7 +176,7 @@ class PlateForce(NamedTuple):
     """Of computing."""
 
 
-def prepare(plate: Plate, buried: float = BURIED) -> tuple[Simulation, float, NDArray[np.bool_]]:
+def prepare(plate: Plate) -> tuple[Simulation, float, NDArray[np.bool_]]:
     """The bed with the plate at its start.
 
     Returns:
@@ -171,14 +184,14 @@ def prepare(plate: Plate, buried: float = BURIED) -> tuple[Simulation, float, ND
         a mirror.
     """
     dim, dx, size = plate.dim, plate.dx, plate.length
-    shape = box(*([size] * (dim - 1)), plate.thick)
+    grown = 2.0 * plate.early * dx
+    shape = box(*([size + grown] * (dim - 1)), plate.thick + grown)
     rotation, direction = plate.rotation, plate.direction
     corners = shape.vertices @ rotation.T
-    down = rotation[:, -1] * (-1.0 if -rotation[:, -1] @ direction >= -1e-12 else 1.0)
-    face = 0.5 * plate.thick * down  # centre of the leading face, from the plate's own
+    face = 0.5 * plate.thick * plate.leading  # centre of the leading face, from the plate's own
     above = plate.z + face[-1] - corners[:, -1].min()  # of the plate's lowest point on its way down to the reading
     from_surface = above / -direction[-1] if direction[-1] < 0.0 else math.inf
-    approach = from_surface if from_surface <= size else buried * size
+    approach = from_surface if from_surface <= size else plate.buried * size
     window = plate.window
     margin = plate.bed * spread(plate.mu_int) * size * (1.0 if dim == 2 else 0.6)
     reach = np.abs(corners).max(axis=0)
@@ -208,15 +221,14 @@ def prepare(plate: Plate, buried: float = BURIED) -> tuple[Simulation, float, ND
     return sim, approach, mirrors
 
 
-def measure(plate: Plate, watch: Watch | None = None, buried: float = BURIED) -> PlateForce:
+def measure(plate: Plate, watch: Watch | None = None) -> PlateForce:
     """Move the plate to a little beyond the reading.
 
     Args:
         plate: What to do.
         watch: Called after each step with the simulation and the share of the way that is done.
-        buried: Travel before the reading of a plate that does not start at the surface [plate lengths].
     """
-    sim, approach, mirrors = prepare(plate, buried)
+    sim, approach, mirrors = prepare(plate)
     share = 0.5 ** int(mirrors.sum())
     window = plate.window
     first = sim.bodies[0].position.copy()
@@ -236,13 +248,18 @@ def measure(plate: Plate, watch: Watch | None = None, buried: float = BURIED) ->
     history = log.history(plate.dim)
     history.force[:, : plate.dim - 1][:, mirrors] = 0.0  # the image's share cancels it
     force, noise = read(history, approach, window)
+    body, surface = sim.bodies[0], sim.surfaces[0]
+    leads = surface.normals @ body.to_local(body.position + plate.leading) > 0.999
+    face = body.rotation @ (-surface.areas[leads] @ traction[leads]) / (steps * share)
+    face[: plate.dim - 1][mirrors] = 0.0
     return PlateForce(
         force=force,
+        face=face,
         alpha=force / (plate.area * plate.z),
         depth=plate.z,
         noise=noise,
         history=history,
-        profile=profile(sim.bodies[0], sim.surfaces[0], traction / steps, plate.dx),
+        profile=profile(body, surface, traction / steps, plate.dx),
         particles=len(sim.particles),
         steps=sim.steps,
         seconds=time.perf_counter() - began,

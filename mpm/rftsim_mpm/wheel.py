@@ -21,8 +21,10 @@ class Wheel:
 
     rpm: float = 30.0
     """Spin; positive rolls towards +x [1/min]."""
-    duration: float = 3.0
-    """Simulated time [s]."""
+    duration: float | None = None
+    """Simulated time [s]; by default one second and half a turn."""
+    entry: float = 0.8
+    """Forward speed at the start, over omega r, r with grousers [-]."""
     radius: float = 0.094
     """Without grousers [m]."""
     grousers: int = 20
@@ -50,7 +52,11 @@ class Wheel:
     """[m/s^2]."""
 
     def __post_init__(self) -> None:
-        for name in ("duration", "radius", "height", "width", "breadth", "mass_x", "mass_z", "mu_int", "rho", "dx"):
+        if not (math.isfinite(self.rpm) and self.rpm != 0.0):
+            raise MpmError(f"rpm must be finite and not zero, not {self.rpm:g}")
+        if self.duration is not None and not (math.isfinite(self.duration) and self.duration > 0.0):
+            raise MpmError(f"duration must be positive and finite, not {self.duration:g}")
+        for name in ("radius", "height", "width", "breadth", "mass_x", "mass_z", "mu_int", "rho", "dx"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0.0):
                 raise MpmError(f"{name} must be positive and finite, not {getattr(self, name):g}")
         if self.grousers < 2 or self.grousers * self.width >= 2.0 * math.pi * self.radius:
@@ -63,6 +69,11 @@ class Wheel:
     def outer(self) -> float:
         """Radius with grousers [m]."""
         return self.radius + self.height
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return self.duration or 1.0 + 30.0 / abs(self.rpm)
 
 
 class Rolling(NamedTuple):
@@ -84,14 +95,14 @@ def roll(study: Wheel, watch: Watch | None = None) -> Rolling:
     omega, outer, dx = study.rpm * 2.0 * math.pi / 60.0, study.outer, study.dx
     depth = math.ceil(1.5 * outer / dx) * dx
     before = 2.5 * outer
-    length = math.ceil((2.0 * before + abs(omega) * outer * study.duration) / dx) * dx
+    length = math.ceil((2.0 * before + abs(omega) * outer * study.time) / dx) * dx
     young = stiffness(study.rho, study.gravity, 0.3 * outer, study.mu_int, 0.01)
     material = Material.of_density(study.mu_int, study.rho, young)
     weight = study.mass_z * study.gravity
     body = Body(
         wheel(study.radius, study.grousers, study.height, study.width),
         np.array([before if omega >= 0.0 else length - before, depth + outer - 0.5 * study.height]),
-        np.zeros(2),
+        np.array([study.entry * omega * outer, 0.0]),
         study.mu_surf,
         spin=np.array([omega]),
         mass=np.array([study.mass_x, study.mass_z]) / study.breadth,
@@ -108,8 +119,8 @@ def roll(study: Wheel, watch: Watch | None = None) -> Rolling:
         wall_friction=study.mu_int,
     )
     sim.clear_bodies()
-    track = follow(sim, study.duration, watch)
-    steady = track.after(0.6 * study.duration)
+    track = follow(sim, study.time, watch)
+    steady = track.after(0.6 * study.time)
     speed = float(np.mean(steady.velocity[:, 0, 0]))
     sinkage = depth + outer - float(np.mean(steady.position[:, 0, 1]))
     surface, middle = track.frames[-1].surface, float(body.position[0])
@@ -119,5 +130,4 @@ def roll(study: Wheel, watch: Watch | None = None) -> Rolling:
         for s in (-1.0, 1.0)
     )
     drop = float(ahead[:, 1].mean() - behind[:, 1].mean())
-    slip = 1.0 - speed / (omega * outer) if omega else 0.0
-    return Rolling(speed, sinkage, slip, drop, track)
+    return Rolling(speed, sinkage, 1.0 - speed / (omega * outer), drop, track)

@@ -99,6 +99,7 @@ def _report(plate: Plate, found: PlateForce) -> dict[str, Any]:
         "force": found.force.tolist(),
         "depth_m": found.depth,
         "alpha_N_m3": found.alpha.tolist(),
+        "alpha_face_N_m3": (found.face / (plate.area * plate.z)).tolist(),
         "noise": found.noise,
         "particles": found.particles,
         "steps": found.steps,

@@ -78,7 +78,7 @@ class WheelCommand:
         self.out.check()
         study = self.study
         if self.out.quick:
-            study = dataclasses.replace(study, dx=0.005, duration=min(study.duration, 0.5))
+            study = dataclasses.replace(study, dx=0.005, duration=min(study.time, 0.5))
         with self.out.watching("wheel") as watch:
             found = roll(study, watch)
         root = (study.gravity * 2.0 * study.outer) ** 0.5
@@ -99,7 +99,7 @@ class WheelCommand:
             from rftsim_mpm.plots import plot_wheel  # matplotlib is an extra
 
             track = found.track
-            level = found.sinkage + float(track.after(0.6 * study.duration).position[:, 0, 1].mean())
+            level = found.sinkage + float(track.after(0.6 * study.time).position[:, 0, 1].mean())
             height = level - track.position[:, 0, 1]
             plot_wheel(track.time, track.velocity[:, 0, 0], height, track.frames[-1], f"wheel, {study.rpm:g} RPM", path)
 
