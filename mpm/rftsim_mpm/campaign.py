@@ -163,6 +163,7 @@ def _result(plate: Plate, found: PlateForce) -> dict[str, Any]:
         "alpha_face_N_m3": (found.face / (plate.area * plate.z)).tolist(),
         "depth_m": found.depth,
         "noise": found.noise,
+        "heave_m": found.heave,
         "travel_m": [float(f"{x:.6g}") for x in history.travel[some]],
         "history": [[float(f"{x:.5g}") for x in row] for row in history.force[some]],
         "particles": found.particles,

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from rftsim_mpm.bed import level_bed
 from rftsim_mpm.body import Body, plane_rotation, turned
 from rftsim_mpm.errors import MpmError
+from rftsim_mpm.fields import Camera
 from rftsim_mpm.material import Material, stiffness
 from rftsim_mpm.reading import History, Log, limit, read
 from rftsim_mpm.shapes import Surface, box, patches
@@ -167,6 +168,8 @@ class PlateForce(NamedTuple):
     """Of the leading face's centre [m]."""
     noise: float
     """Of averages over 0.5 ms, relative [-]."""
+    heave: float
+    """How far the sand has risen beside the plate, on average over a plate's length to either side [m]."""
     history: History
     profile: tuple[Array, Array]
     """Mean stress on the surface while reading: places in the plate's frame [m] and stresses [Pa], (n, dim) both."""
@@ -233,6 +236,7 @@ def measure(plate: Plate, watch: Watch | None = None) -> PlateForce:
     window = plate.window
     first = sim.bodies[0].position.copy()
     descent = -float(plate.direction[-1])
+    level = first[-1] + 0.5 * plate.thick * plate.leading[-1] + plate.z - approach * descent  # of the sand at rest
     log, traction, steps = Log(), np.zeros_like(sim.traction[0]), 0
     began, travel = time.perf_counter(), 0.0
     while travel < approach + window:
@@ -258,12 +262,20 @@ def measure(plate: Plate, watch: Watch | None = None) -> PlateForce:
         alpha=force / (plate.area * plate.z),
         depth=plate.z,
         noise=noise,
+        heave=_heave(sim, plate, level),
         history=history,
         profile=profile(body, surface, traction / steps, plate.dx),
         particles=len(sim.particles),
         steps=sim.steps,
         seconds=time.perf_counter() - began,
     )
+
+
+def _heave(sim: Simulation, plate: Plate, level: float) -> float:
+    surface, body = Camera(sim).shoot(sim).surface, sim.bodies[0]
+    beside = np.abs(surface[:, 0] - body.position[0]) - np.abs(body.vertices[:, 0] - body.position[0]).max()
+    near = (beside > 0.0) & (beside < plate.length)
+    return float(surface[near, 1].mean()) - level
 
 
 def profile(body: Body, surface: Surface, traction: Array, dx: float) -> tuple[Array, Array]:

@@ -126,17 +126,22 @@ def short(value, measured):
 @pytest.mark.parametrize(
     "mu",
     [
-        short(0.3, "160 and 165 N/m: above the bracket's 146"),
+        0.3,
         0.4,
         0.5,
         short(0.6, "1232 and 1103 N/m: -10.5 % from 10 to 20 cells"),
     ],
 )
 def test_force_lies_in_the_bracket_and_converges(mu):
-    """At 20 mm: between the limit loads (the upper one plus 10 %), 10 and 20 cells within 5 %, noise at most 5 %."""
+    """At 20 mm: between the limit loads (the upper one plus 10 %), 10 and 20 cells within 5 %, noise at most 5 %.
+
+    The limit loads are those of a level surface where it stands now: what the plate displaces has risen beside it by
+    about 5 mm, a quarter of the depth. Under the surface as it was, the upper one plus 10 % is 146 N/m at mu 0.3, and
+    what is measured is 165.
+    """
     plate = Plate(mu_int=mu)
     coarse, fine = measure(plate), measure(finer(plate))
-    low, high = loads(mu)
+    low, high = loads(mu, depth=plate.z + fine.heave)
     assert low < fine.force[1] < 1.1 * high
     assert fine.force[1] == pytest.approx(coarse.force[1], rel=0.05)
     assert max(coarse.noise, fine.noise) < 0.05

@@ -101,6 +101,7 @@ def _report(plate: Plate, found: PlateForce) -> dict[str, Any]:
         "alpha_N_m3": found.alpha.tolist(),
         "alpha_face_N_m3": (found.face / (plate.area * plate.z)).tolist(),
         "noise": found.noise,
+        "heave_m": found.heave,
         "particles": found.particles,
         "steps": found.steps,
         "seconds": found.seconds,
@@ -133,7 +134,10 @@ def _print(plate: Plate, report: dict[str, Any]) -> None:
         text = ", ".join(f"F{n} {f:.4g} {unit}" for n, f in zip(names, force, strict=True))
         per = ", ".join(f"α{n} {a:.4g}" for n, a in zip(names, alpha, strict=True))
         console.print(f"{label}{text}; per area and depth {per} N/m³")
-    console.print(f"noise of 0.5 ms averages {100 * report['noise']:.1f} %")
+    console.print(
+        f"noise of 0.5 ms averages {100 * report['noise']:.1f} %; beside the plate the sand has risen "
+        f"{1e3 * report['heave_m']:.1f} mm"
+    )
     console.print(
         f"{report['particles']} particles, {report['steps']} steps, {report['seconds']:.1f} s, "
         f"{1e-6 * report['particle_updates_per_s']:.1f} M particle-updates/s"
