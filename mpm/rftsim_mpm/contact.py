@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 
 from rftsim_mpm.compiled import SOURCE
-from rftsim_mpm.transfer import OPTIONS, pick, spline
+from rftsim_mpm.transfer import FORCE, MOMENTUM, OPTIONS, pick, spline
 from rftsim_mpm.walls import mirrored
 
 FULL = 0.5
@@ -92,11 +92,11 @@ def make_contact(dim: int) -> Any:
                                 mass += grid[node, 0]
                                 for d in range(DIM):
                                     if at[d] != 1 and at[d] != shape[d] - 2:
-                                        slip[d] += w * found[image, 1 + d] * grid[node, 1 + d]
+                                        slip[d] += w * found[image, 1 + d] * grid[node, MOMENTUM + d]
                             w *= mass
                         else:
                             for d in range(DIM):
-                                slip[d] += w * grid[row + c, 1 + d]
+                                slip[d] += w * grid[row + c, MOMENTUM + d]
                             w *= grid[row + c, 0]
                         weight[n], rows[n] = w, row + c
                         total += w
@@ -137,6 +137,6 @@ def make_contact(dim: int) -> Any:
                 for b in range(DIM):
                     push[q, a] += rotation[a, b] * areas[q] * traction[q, b]
                 for m in range(count):
-                    grid[rows[m], 1 + DIM + a] += weight[m] / total * push[q, a]
+                    grid[rows[m], FORCE + a] += weight[m] / total * push[q, a]
 
     return touch

@@ -13,7 +13,7 @@ from rftsim_mpm.body import Body
 from rftsim_mpm.contact import make_contact
 from rftsim_mpm.errors import MpmError
 from rftsim_mpm.material import Material
-from rftsim_mpm.transfer import make_transfer
+from rftsim_mpm.transfer import ROW, make_transfer
 from rftsim_mpm.walls import make_grid_step
 
 Array = NDArray[np.float64]
@@ -100,7 +100,7 @@ class Simulation:
         self._low = np.zeros(dim)
         self._kernels = _kernels(dim)
         nodes = int(np.prod(self._shape))
-        self._grid, self._flow = np.zeros((nodes, 1 + 2 * dim)), np.zeros((nodes, 2 * dim))
+        self._grid, self._flow = np.zeros((nodes, ROW)), np.zeros((nodes, ROW))
         self.inset = inset * dx
         self.surfaces = [body.shape.surface(SPACING * dx, self.inset) for body in self.bodies]
         """Of each body, where it touches the sand."""

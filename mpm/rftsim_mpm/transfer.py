@@ -11,8 +11,14 @@ import numpy as np
 from numba import njit
 
 from rftsim_mpm.compiled import FASTMATH, SOURCE
+from rftsim_mpm.lanes import four, lane, load, store
 from rftsim_mpm.material import respond_plane, respond_solid
 
+MOMENTUM, FORCE = 1, 5
+"""Where these begin in a row of the grid; the new velocity and its change in a row of the flow, likewise."""
+VELOCITY, CHANGE = MOMENTUM, FORCE
+ROW = 8
+"""Numbers in a row."""
 OPTIONS = {"fastmath": FASTMATH, "error_model": "numpy", "cache": True}
 
 
@@ -51,64 +57,56 @@ def small_exp(e):
 
 def make_transfer(dim: int) -> Transfer:
     """The loops of two (plane strain) or three dimensions."""
-    DIM, source = dim, SOURCE  # noqa: N806
+    DIM, DEPTH, source = dim, 3 if dim == 3 else 1, SOURCE  # noqa: N806
     last = dim - 1
+
+    @njit(inline="always")
+    def reach(x, p, low, inv_dx, shape):
+        """The first node of a particle, and for each axis the weights of its three and their slopes; y last."""
+        gx, gz = (x[p, 0] - low[0]) * inv_dx, (x[p, last] - low[last]) * inv_dx
+        i, k = int(gx + 0.5), int(gz + 0.5)
+        fx, fz = gx - i + 1.0, gz - k + 1.0
+        if DIM == 2:
+            return i * shape[last] + k, spline(fx), slope(fx), spline(fz), slope(fz), (1.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+        gy = (x[p, 1] - low[1]) * inv_dx
+        j = int(gy + 0.5)
+        fy = gy - j + 1.0
+        first = (i * shape[1] + j) * shape[last] + k
+        return first, spline(fx), slope(fx), spline(fz), slope(fz), spline(fy), slope(fy)
 
     @njit(**OPTIONS)
     def scatter(x, v, mass, volume, stress, low, inv_dx, shape, grid):
         """Sum the particles' mass, momentum and internal force -V sigma . grad N onto the grid, which is cleared."""
         source  # noqa: B018
         grid[:] = 0.0
-        ny, nz = shape[1], shape[last]
+        ny, nz = shape[1] if DIM == 3 else 1, shape[last]
         for p in range(x.shape[0]):
+            first, wx, sx, wz, sz, wy, sy = reach(x, p, low, inv_dx, shape)
             m, vol = mass[p], -volume[p] * inv_dx
-            gx, gz = (x[p, 0] - low[0]) * inv_dx, (x[p, last] - low[last]) * inv_dx
-            i, k = int(gx + 0.5), int(gz + 0.5)
-            wx, sx = spline(gx - i + 1.0), slope(gx - i + 1.0)
-            wz, sz = spline(gz - k + 1.0), slope(gz - k + 1.0)
             if DIM == 2:
-                px, pz = m * v[p, 0], m * v[p, 1]
+                moved = four(m, m * v[p, 0], m * v[p, 1], 0.0)
                 txx, tzz, txz = vol * stress[p, 0], vol * stress[p, 2], vol * stress[p, 3]
-                for a in range(3):
-                    row = (i + a) * nz + k
-                    wa, sa = pick(wx, a), pick(sx, a)
-                    m_, px_, pz_ = wa * m, wa * px, wa * pz
-                    qx, qz, rx, rz = sa * txx, sa * txz, wa * txz, wa * tzz
-                    for c in range(3):
-                        wc, sc = pick(wz, c), pick(sz, c)
-                        node = grid[np.uintp(row + c)]
-                        node[0] += wc * m_
-                        node[1] += wc * px_
-                        node[2] += wc * pz_
-                        node[3] += wc * qx + sc * rx
-                        node[4] += wc * qz + sc * rz
+                tx, ty, tz = four(0.0, txx, txz, 0.0), four(0.0, 0.0, 0.0, 0.0), four(0.0, txz, tzz, 0.0)
             else:
-                gy = (x[p, 1] - low[1]) * inv_dx
-                j = int(gy + 0.5)
-                wy, sy = spline(gy - j + 1.0), slope(gy - j + 1.0)
-                px, py, pz = m * v[p, 0], m * v[p, 1], m * v[p, 2]
+                moved = four(m, m * v[p, 0], m * v[p, 1], m * v[p, 2])
                 txx, tyy, tzz = vol * stress[p, 0], vol * stress[p, 1], vol * stress[p, 2]
                 tyz, txz, txy = vol * stress[p, 3], vol * stress[p, 4], vol * stress[p, 5]
-                for a in range(3):
-                    wa, sa = pick(wx, a), pick(sx, a)
-                    for b in range(3):
-                        row = ((i + a) * ny + j + b) * nz + k
-                        wb = pick(wy, b)
-                        wab, sab, tab = wa * wb, sa * wb, wa * pick(sy, b)
-                        m_, px_, py_, pz_ = wab * m, wab * px, wab * py, wab * pz
-                        qx, rx = sab * txx + tab * txy, wab * txz
-                        qy, ry = sab * txy + tab * tyy, wab * tyz
-                        qz, rz = sab * txz + tab * tyz, wab * tzz
-                        for c in range(3):
-                            wc, sc = pick(wz, c), pick(sz, c)
-                            node = grid[np.uintp(row + c)]
-                            node[0] += wc * m_
-                            node[1] += wc * px_
-                            node[2] += wc * py_
-                            node[3] += wc * pz_
-                            node[4] += wc * qx + sc * rx
-                            node[5] += wc * qy + sc * ry
-                            node[6] += wc * qz + sc * rz
+                tx, ty, tz = four(0.0, txx, txy, txz), four(0.0, txy, tyy, tyz), four(0.0, txz, tyz, tzz)
+            for a in range(3):
+                wa, sa = pick(wx, a), pick(sx, a)
+                for b in range(DEPTH):
+                    row = first + (a * ny + b) * nz
+                    wb = pick(wy, b)
+                    wab = wa * wb
+                    m_, r = wab * moved, wab * tz
+                    q = (sa * wb) * tx
+                    if DIM == 3:
+                        q += (wa * pick(sy, b)) * ty
+                    for c in range(3):
+                        wc, sc = pick(wz, c), pick(sz, c)
+                        node = np.uintp(row + c)
+                        store(grid, node, 0, load(grid, node, 0) + wc * m_)
+                        store(grid, node, 4, load(grid, node, 4) + wc * q + sc * r)
 
     @njit(**OPTIONS)
     def gather(x, v, mass, volume, stress, theta, theta_d, strain, low, inv_dx, shape, flow, dt, constants):
@@ -117,116 +115,61 @@ def make_transfer(dim: int) -> Transfer:
         x += dt sum N v_new;  v += sum N (v_new - v_old);  V *= exp(dt tr L).
         """
         source  # noqa: B018
-        ny, nz = shape[1], shape[last]
+        ny, nz = shape[1] if DIM == 3 else 1, shape[last]
         rate = dt * inv_dx
         for p in range(x.shape[0]):
-            gx, gz = (x[p, 0] - low[0]) * inv_dx, (x[p, last] - low[last]) * inv_dx
-            i, k = int(gx + 0.5), int(gz + 0.5)
-            wx, sx = spline(gx - i + 1.0), slope(gx - i + 1.0)
-            wz, sz = spline(gz - k + 1.0), slope(gz - k + 1.0)
-            if DIM == 2:
-                ux = uz = ax = az = lxx = lxz = lzx = lzz = 0.0
-                for a in range(3):
-                    row = (i + a) * nz + k
-                    wa, sa = pick(wx, a), pick(sx, a)
-                    ux_ = uz_ = ax_ = az_ = tx_ = tz_ = 0.0
+            first, wx, sx, wz, sz, wy, sy = reach(x, p, low, inv_dx, shape)
+            zero = four(0.0, 0.0, 0.0, 0.0)
+            new, change = zero, zero  # and the derivatives of the new velocity by x, y, z:
+            by_x, by_y, by_z = zero, zero, zero
+            for a in range(3):
+                wa, sa = pick(wx, a), pick(sx, a)
+                for b in range(DEPTH):
+                    row = first + (a * ny + b) * nz
+                    wb = pick(wy, b)
+                    wab = wa * wb
+                    new_, change_, by_z_ = zero, zero, zero
                     for c in range(3):
                         wc, sc = pick(wz, c), pick(sz, c)
-                        node = flow[np.uintp(row + c)]
-                        ux_ += wc * node[0]
-                        uz_ += wc * node[1]
-                        ax_ += wc * node[2]
-                        az_ += wc * node[3]
-                        tx_ += sc * node[0]
-                        tz_ += sc * node[1]
-                    ux += wa * ux_
-                    uz += wa * uz_
-                    ax += wa * ax_
-                    az += wa * az_
-                    lxx += sa * ux_
-                    lzx += sa * uz_
-                    lxz += wa * tx_
-                    lzz += wa * tz_
-                x[p, 0] += dt * ux
-                x[p, 1] += dt * uz
-                v[p, 0] += ax
-                v[p, 1] += az
-                opening = rate * (lxx + lzz)
-                theta[p] -= opening
-                volume[p] *= small_exp(opening)
-                old = stress[p, 0], stress[p, 1], stress[p, 2], stress[p, 3]
-                new, slip, theta_d[p] = respond_plane(
-                    old, theta[p], theta_d[p], rate * lxx, rate * lxz, rate * lzx, rate * lzz, constants
-                )
+                        node = np.uintp(row + c)
+                        velocity = load(flow, node, 0)
+                        new_ += wc * velocity
+                        by_z_ += sc * velocity
+                        change_ += wc * load(flow, node, 4)
+                    new += wab * new_
+                    change += wab * change_
+                    by_x += (sa * wb) * new_
+                    if DIM == 3:
+                        by_y += (wa * pick(sy, b)) * new_
+                    by_z += wab * by_z_
+            by_x, by_y, by_z = rate * by_x, rate * by_y, rate * by_z
+            x[p, 0] += dt * lane(new, 1)
+            x[p, 1] += dt * lane(new, 2)
+            v[p, 0] += lane(change, 1)
+            v[p, 1] += lane(change, 2)
+            if DIM == 2:
+                lxx, lxz, lzx, lzz = lane(by_x, 1), lane(by_z, 1), lane(by_x, 2), lane(by_z, 2)
+                opening = lxx + lzz
             else:
-                gy = (x[p, 1] - low[1]) * inv_dx
-                j = int(gy + 0.5)
-                wy, sy = spline(gy - j + 1.0), slope(gy - j + 1.0)
-                ux = uy = uz = ax = ay = az = 0.0
-                lxx = lxy = lxz = lyx = lyy = lyz = lzx = lzy = lzz = 0.0
-                for a in range(3):
-                    wa, sa = pick(wx, a), pick(sx, a)
-                    for b in range(3):
-                        row = ((i + a) * ny + j + b) * nz + k
-                        wb = pick(wy, b)
-                        wab, sab, tab = wa * wb, sa * wb, wa * pick(sy, b)
-                        ux_ = uy_ = uz_ = ax_ = ay_ = az_ = tx_ = ty_ = tz_ = 0.0
-                        for c in range(3):
-                            wc, sc = pick(wz, c), pick(sz, c)
-                            node = flow[np.uintp(row + c)]
-                            ux_ += wc * node[0]
-                            uy_ += wc * node[1]
-                            uz_ += wc * node[2]
-                            ax_ += wc * node[3]
-                            ay_ += wc * node[4]
-                            az_ += wc * node[5]
-                            tx_ += sc * node[0]
-                            ty_ += sc * node[1]
-                            tz_ += sc * node[2]
-                        ux += wab * ux_
-                        uy += wab * uy_
-                        uz += wab * uz_
-                        ax += wab * ax_
-                        ay += wab * ay_
-                        az += wab * az_
-                        lxx += sab * ux_
-                        lyx += sab * uy_
-                        lzx += sab * uz_
-                        lxy += tab * ux_
-                        lyy += tab * uy_
-                        lzy += tab * uz_
-                        lxz += wab * tx_
-                        lyz += wab * ty_
-                        lzz += wab * tz_
-                x[p, 0] += dt * ux
-                x[p, 1] += dt * uy
-                x[p, 2] += dt * uz
-                v[p, 0] += ax
-                v[p, 1] += ay
-                v[p, 2] += az
-                opening = rate * (lxx + lyy + lzz)
-                theta[p] -= opening
-                volume[p] *= small_exp(opening)
-                six = stress[p, 0], stress[p, 1], stress[p, 2], stress[p, 3], stress[p, 4], stress[p, 5]
-                six, slip, theta_d[p] = respond_solid(
-                    six,
-                    theta[p],
-                    theta_d[p],
-                    rate * lxx,
-                    rate * lxy,
-                    rate * lxz,
-                    rate * lyx,
-                    rate * lyy,
-                    rate * lyz,
-                    rate * lzx,
-                    rate * lzy,
-                    rate * lzz,
-                    constants,
+                x[p, 2] += dt * lane(new, 3)
+                v[p, 2] += lane(change, 3)
+                lxx, lxy, lxz = lane(by_x, 1), lane(by_y, 1), lane(by_z, 1)
+                lyx, lyy, lyz = lane(by_x, 2), lane(by_y, 2), lane(by_z, 2)
+                lzx, lzy, lzz = lane(by_x, 3), lane(by_y, 3), lane(by_z, 3)
+                opening = lxx + lyy + lzz
+            theta[p] -= opening
+            volume[p] *= small_exp(opening)
+            if DIM == 2:
+                old = stress[p, 0], stress[p, 1], stress[p, 2], stress[p, 3]
+                t, slip, theta_d[p] = respond_plane(old, theta[p], theta_d[p], lxx, lxz, lzx, lzz, constants)
+            else:
+                old = stress[p, 0], stress[p, 1], stress[p, 2], stress[p, 3], stress[p, 4], stress[p, 5]
+                t, slip, theta_d[p] = respond_solid(
+                    old, theta[p], theta_d[p], lxx, lxy, lxz, lyx, lyy, lyz, lzx, lzy, lzz, constants
                 )
-                stress[p, 4], stress[p, 5] = six[4], six[5]
-                new = six[0], six[1], six[2], six[3]
+                stress[p, 4], stress[p, 5] = t[4], t[5]
+            stress[p, 0], stress[p, 1], stress[p, 2], stress[p, 3] = t[0], t[1], t[2], t[3]
             strain[p] += slip
-            stress[p, 0], stress[p, 1], stress[p, 2], stress[p, 3] = new
 
     @njit(**OPTIONS)
     def order(x, low, inv_dx, shape):
@@ -274,7 +217,7 @@ def make_transfer(dim: int) -> Transfer:
                                     grid[row + c, 1 + d] += w * m * u[p, d]
                             elif grid[row + c, 0] > 0.0:
                                 for d in range(DIM):
-                                    grid[row + c, 1 + DIM + d] = grid[row + c, 1 + d] / grid[row + c, 0]
-                                    u[p, d] -= w * grid[row + c, 1 + DIM + d]
+                                    grid[row + c, FORCE + d] = grid[row + c, 1 + d] / grid[row + c, 0]
+                                    u[p, d] -= w * grid[row + c, FORCE + d]
 
     return Transfer(scatter, gather, order, project)

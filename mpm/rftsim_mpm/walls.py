@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 
 from rftsim_mpm.compiled import FASTMATH, SOURCE
-from rftsim_mpm.transfer import OPTIONS
+from rftsim_mpm.transfer import CHANGE, FORCE, MOMENTUM, OPTIONS, VELOCITY
 
 
 @njit(inline="always")
@@ -55,17 +55,17 @@ def _rub(grid, shape, dt, axis, side, mu, flow, impulse):
         mass = grid[node, 0]
         normal, speed2 = 0.0, 0.0
         for n in range(node - stride, node + stride + 1, stride):
-            normal += inward * (grid[n, 0] * flow[n, dim + axis] - dt * grid[n, 1 + dim + axis])
+            normal += inward * (grid[n, 0] * flow[n, CHANGE + axis] - dt * grid[n, FORCE + axis])
         for a in range(dim):
-            speed2 += flow[node, a] * flow[node, a] if a != axis else 0.0
+            speed2 += flow[node, VELOCITY + a] * flow[node, VELOCITY + a] if a != axis else 0.0
         if mass <= 0.0 or normal <= 0.0 or speed2 == 0.0:
             continue
         share = min(1.0, mu * normal / (mass * np.sqrt(speed2)))
         for a in range(dim):
             if a != axis:
-                loss = share * flow[node, a]
-                flow[node, a] -= loss
-                flow[node, dim + a] -= loss
+                loss = share * flow[node, VELOCITY + a]
+                flow[node, VELOCITY + a] -= loss
+                flow[node, CHANGE + a] -= loss
                 impulse[axis, side, a] -= mass * loss
 
 
@@ -93,7 +93,7 @@ def make_grid_step(dim: int) -> Any:
         found = np.ones((1 << DIM, 1 + DIM), np.int64)
         for node in range(grid.shape[0]):
             for a in range(DIM):
-                grid[node, 1 + DIM + a] += grid[node, 0] * gravity[a]
+                grid[node, FORCE + a] += grid[node, 0] * gravity[a]
         for node in range(grid.shape[0]):
             axis = DIM - 1
             at[axis] += 1
@@ -108,9 +108,9 @@ def make_grid_step(dim: int) -> Any:
                 mass = grid[node, 0]
                 inverse = 1.0 / mass if mass > 0.0 else 0.0
                 for a in range(DIM):
-                    change = grid[node, 1 + DIM + a] * inverse * dt
-                    flow[node, a] = grid[node, 1 + a] * inverse + change
-                    flow[node, DIM + a] = change
+                    change = grid[node, FORCE + a] * inverse * dt
+                    flow[node, VELOCITY + a] = grid[node, MOMENTUM + a] * inverse + change
+                    flow[node, CHANGE + a] = change
                 continue
             images = mirrored(shape, at, found)
             mass = 0.0
@@ -119,17 +119,17 @@ def make_grid_step(dim: int) -> Any:
             for a in range(DIM):
                 momentum = force = 0.0
                 for image in range(images):
-                    momentum += found[image, 1 + a] * grid[found[image, 0], 1 + a]
-                    force += found[image, 1 + a] * grid[found[image, 0], 1 + DIM + a]
+                    momentum += found[image, 1 + a] * grid[found[image, 0], MOMENTUM + a]
+                    force += found[image, 1 + a] * grid[found[image, 0], FORCE + a]
                 if mass <= 0.0 or at[a] == 1 or at[a] == shape[a] - 2:
                     momentum, force = 0.0, 0.0
                 inverse = 1.0 / mass if mass > 0.0 else 0.0
                 change = force * inverse * dt
-                flow[node, a] = momentum * inverse + change
-                flow[node, DIM + a] = change
+                flow[node, VELOCITY + a] = momentum * inverse + change
+                flow[node, CHANGE + a] = change
                 if at[a] <= 2 or at[a] >= shape[a] - 3:
                     side = 0 if at[a] <= 2 else 1
-                    impulse[a, side, a] += grid[node, 0] * change - dt * grid[node, 1 + DIM + a]
+                    impulse[a, side, a] += grid[node, 0] * change - dt * grid[node, FORCE + a]
         for a in range(DIM):
             for side in range(2):
                 if friction[a, side] > 0.0:
