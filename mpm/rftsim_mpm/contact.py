@@ -12,7 +12,8 @@ import numpy as np
 from numba import njit
 
 from rftsim_mpm.compiled import SOURCE
-from rftsim_mpm.transfer import FORCE, MOMENTUM, OPTIONS, pick, spline
+from rftsim_mpm.lanes import four, lane, load, store
+from rftsim_mpm.transfer import MOMENTUM, OPTIONS, pick, spline
 from rftsim_mpm.walls import mirrored
 
 FULL = 0.5
@@ -50,7 +51,8 @@ def make_contact(dim: int) -> Any:
         source  # noqa: B018
         centre, rotation, velocity, spin = motion
         ny, nz = shape[1], shape[last]
-        weight, rows = np.zeros(count), np.zeros(count, np.int64)
+        weight, rows = np.zeros(count), np.zeros(count, np.uintp)
+        seen = np.zeros((1, 4))  # mass and momentum
         slip, local, t, at = np.zeros(DIM), np.zeros(DIM), np.zeros(DIM), np.zeros(DIM, np.int64)
         found = np.ones((1 << DIM, 1 + DIM), np.int64)
         for q in range(points.shape[0]):
@@ -71,8 +73,7 @@ def make_contact(dim: int) -> Any:
             gy = (place[q, 1] - low[1]) * inv_dx if DIM == 3 else 0.0
             i, j, k = int(gx + 0.5), int(gy + 0.5), int(gz + 0.5)
             wx, wy, wz = spline(gx - i + 1.0), spline(gy - j + 1.0), spline(gz - k + 1.0)
-            total = 0.0
-            slip[:] = 0.0
+            mean = four(0.0, 0.0, 0.0, 0.0)
             n = 0
             for a in range(3):
                 for b in range(3 if DIM == 3 else 1):
@@ -86,27 +87,27 @@ def make_contact(dim: int) -> Any:
                                 at[1] = j + b
                             for d in range(DIM):  # a node in a wall's plane has half of the mirrored bed's mass
                                 w *= 2.0 if at[d] == 1 or at[d] == shape[d] - 2 else 1.0
-                            mass = 0.0
+                            seen[:] = 0.0
                             for image in range(mirrored(shape, at, found)):
                                 node = found[image, 0]
-                                mass += grid[node, 0]
+                                seen[0, 0] += grid[node, 0]
                                 for d in range(DIM):
                                     if at[d] != 1 and at[d] != shape[d] - 2:
-                                        slip[d] += w * found[image, 1 + d] * grid[node, MOMENTUM + d]
-                            w *= mass
+                                        seen[0, 1 + d] += found[image, 1 + d] * grid[node, MOMENTUM + d]
+                            sand = load(seen, 0, 0)
                         else:
-                            for d in range(DIM):
-                                slip[d] += w * grid[row + c, MOMENTUM + d]
-                            w *= grid[row + c, 0]
-                        weight[n], rows[n] = w, row + c
-                        total += w
+                            sand = load(grid, np.uintp(row + c), 0)
+                        mean += w * sand
+                        weight[n], rows[n] = w * lane(sand, 0), row + c
                         n += 1
+            total = lane(mean, 0)
             ramp = min(1.0, (total / full - FULL) / RAMP)
             if ramp <= 0.0:
                 traction[q, :] = 0.0
                 continue
+            store(seen, 0, 0, mean)
             for a in range(DIM):
-                slip[a] = slip[a] / total - velocity[a]
+                slip[a] = seen[0, 1 + a] / total - velocity[a]
             if DIM == 2:
                 slip[0] -= spin[0] * (place[q, 1] - centre[1])
                 slip[1] += spin[0] * (place[q, 0] - centre[0])
@@ -136,7 +137,8 @@ def make_contact(dim: int) -> Any:
             for a in range(DIM):
                 for b in range(DIM):
                     push[q, a] += rotation[a, b] * areas[q] * traction[q, b]
-                for m in range(count):
-                    grid[rows[m], FORCE + a] += weight[m] / total * push[q, a]
+            per_mass = (1.0 / total) * four(0.0, push[q, 0], push[q, 1], push[q, last] if DIM == 3 else 0.0)
+            for m in range(count):
+                store(grid, rows[m], 4, load(grid, rows[m], 4) + weight[m] * per_mass)
 
     return touch
