@@ -5,7 +5,9 @@ from pathlib import Path
 from typing import Final
 
 SOURCE: Final = hashlib.sha256(
-    b"".join(path.read_bytes() for path in sorted(Path(__file__).parent.glob("*.py")) if b"njit" in path.read_bytes())
+    b"".join(
+        path.read_bytes() for path in sorted(Path(__file__).parent.glob("*.py")) if b"from numba" in path.read_bytes()
+    )
 ).hexdigest()
 """Identifies the source of everything that is compiled.
 

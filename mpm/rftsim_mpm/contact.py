@@ -51,7 +51,7 @@ def make_contact(dim: int) -> Any:
         source  # noqa: B018
         centre, rotation, velocity, spin = motion
         ny, nz = shape[1], shape[last]
-        weight, rows = np.zeros(count), np.zeros(count, np.uintp)
+        weight, rows = np.zeros(count), np.zeros(count, np.int64)
         seen = np.zeros((1, 4))  # mass and momentum
         slip, local, t, at = np.zeros(DIM), np.zeros(DIM), np.zeros(DIM), np.zeros(DIM, np.int64)
         found = np.ones((1 << DIM, 1 + DIM), np.int64)
@@ -96,7 +96,7 @@ def make_contact(dim: int) -> Any:
                                         seen[0, 1 + d] += found[image, 1 + d] * grid[node, MOMENTUM + d]
                             sand = load(seen, 0, 0)
                         else:
-                            sand = load(grid, np.uintp(row + c), 0)
+                            sand = load(grid, row + c, 0)
                         mean += w * sand
                         weight[n], rows[n] = w * lane(sand, 0), row + c
                         n += 1

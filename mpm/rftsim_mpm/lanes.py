@@ -1,8 +1,11 @@
 """Four numbers side by side, which compiled code adds and multiplies at once; numba has no type for them.
 
-    row = load(grid, node, 4)  # grid[node, 4:8]
-    store(grid, node, 4, row + weight * four(0.0, fx, fy, fz))
-    fx = lane(row, 1)
+The last four of a row of eight, and what is added to them:
+
+    force = load(grid, node, 4)
+    store(grid, node, 4, force + weight * four(0.0, fx, fy, fz))
+
+They are written out, since numba leaves LLVM's own search for such fours (SLP) switched off.
 """
 
 import operator
@@ -47,8 +50,9 @@ def _built(builder: Any, values: Any) -> Any:
 
 def _pointer(context: Any, builder: Any, kind: Any, array: Any, row: Any, column: Any) -> Any:
     """Of array[row, column], without a look at bounds or signs."""
-    found = cgutils.get_item_pointer(context, builder, kind, context.make_array(kind)(context, builder, array),
-                                     (row, column), wraparound=False)
+    found = cgutils.get_item_pointer(
+        context, builder, kind, context.make_array(kind)(context, builder, array), (row, column), wraparound=False
+    )
     return builder.bitcast(found, _VECTOR.as_pointer())
 
 

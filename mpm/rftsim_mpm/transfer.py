@@ -1,8 +1,9 @@
 """Between particles and grid: quadratic B-splines, one source for plane strain (x, z) and three dimensions (x, y, z).
 
 `DIM` is closed over, so that numba compiles each of the two without the other's branches. A node's row of `grid` holds
-its mass, momentum and force; a row of `flow` its new velocity and the change of its velocity during the step. Node 1 of
-each axis lies on the lower wall, node 0 outside it.
+its mass, momentum and force; a row of `flow` its new velocity and the change of its velocity during the step. Either is
+two fours of `lanes`: mass and momentum, nothing and force. Node 1 of each axis lies on the lower wall, node 0 outside
+it.
 """
 
 from typing import Any, NamedTuple
@@ -14,11 +15,12 @@ from rftsim_mpm.compiled import FASTMATH, SOURCE
 from rftsim_mpm.lanes import four, lane, load, store
 from rftsim_mpm.material import respond_plane, respond_solid
 
-MOMENTUM, FORCE = 1, 5
-"""Where these begin in a row of the grid; the new velocity and its change in a row of the flow, likewise."""
-VELOCITY, CHANGE = MOMENTUM, FORCE
 ROW = 8
-"""Numbers in a row."""
+"""Numbers in a node's row: two fours, of which the plane leaves the last of each zero."""
+MOMENTUM, FORCE = 1, 5
+"""Where these begin in a row of `grid`; the mass comes first."""
+VELOCITY, CHANGE = MOMENTUM, FORCE
+"""Where these begin in a row of `flow`: in the same places."""
 OPTIONS = {"fastmath": FASTMATH, "error_model": "numpy", "cache": True}
 
 
@@ -62,7 +64,10 @@ def make_transfer(dim: int) -> Transfer:
 
     @njit(inline="always")
     def reach(x, p, low, inv_dx, shape):
-        """The first node of a particle, and for each axis the weights of its three and their slopes; y last."""
+        """The first of a particle's nodes, and the weights of three along x, z and y, each followed by its slopes.
+
+        In the plane the three along y are one, of weight 1.
+        """
         gx, gz = (x[p, 0] - low[0]) * inv_dx, (x[p, last] - low[last]) * inv_dx
         i, k = int(gx + 0.5), int(gz + 0.5)
         fx, fz = gx - i + 1.0, gz - k + 1.0
@@ -104,7 +109,7 @@ def make_transfer(dim: int) -> Transfer:
                         q += (wa * pick(sy, b)) * ty
                     for c in range(3):
                         wc, sc = pick(wz, c), pick(sz, c)
-                        node = np.uintp(row + c)
+                        node = row + c
                         store(grid, node, 0, load(grid, node, 0) + wc * m_)
                         store(grid, node, 4, load(grid, node, 4) + wc * q + sc * r)
 
@@ -120,8 +125,8 @@ def make_transfer(dim: int) -> Transfer:
         for p in range(x.shape[0]):
             first, wx, sx, wz, sz, wy, sy = reach(x, p, low, inv_dx, shape)
             zero = four(0.0, 0.0, 0.0, 0.0)
-            new, change = zero, zero  # and the derivatives of the new velocity by x, y, z:
-            by_x, by_y, by_z = zero, zero, zero
+            new, change = zero, zero  # velocity
+            by_x, by_y, by_z = zero, zero, zero  # derivatives of the new one
             for a in range(3):
                 wa, sa = pick(wx, a), pick(sx, a)
                 for b in range(DEPTH):
@@ -131,7 +136,7 @@ def make_transfer(dim: int) -> Transfer:
                     new_, change_, by_z_ = zero, zero, zero
                     for c in range(3):
                         wc, sc = pick(wz, c), pick(sz, c)
-                        node = np.uintp(row + c)
+                        node = row + c
                         velocity = load(flow, node, 0)
                         new_ += wc * velocity
                         by_z_ += sc * velocity
@@ -163,9 +168,9 @@ def make_transfer(dim: int) -> Transfer:
                 old = stress[p, 0], stress[p, 1], stress[p, 2], stress[p, 3]
                 t, slip, theta_d[p] = respond_plane(old, theta[p], theta_d[p], lxx, lxz, lzx, lzz, constants)
             else:
-                old = stress[p, 0], stress[p, 1], stress[p, 2], stress[p, 3], stress[p, 4], stress[p, 5]
+                six = stress[p, 0], stress[p, 1], stress[p, 2], stress[p, 3], stress[p, 4], stress[p, 5]
                 t, slip, theta_d[p] = respond_solid(
-                    old, theta[p], theta_d[p], lxx, lxy, lxz, lyx, lyy, lyz, lzx, lzy, lzz, constants
+                    six, theta[p], theta_d[p], lxx, lxy, lxz, lyx, lyy, lyz, lzx, lzy, lzz, constants
                 )
                 stress[p, 4], stress[p, 5] = t[4], t[5]
             stress[p, 0], stress[p, 1], stress[p, 2], stress[p, 3] = t[0], t[1], t[2], t[3]
@@ -196,28 +201,25 @@ def make_transfer(dim: int) -> Transfer:
         """Take from velocities, (n, dim), what they have on the grid: u -= P u, by mass-weighted means."""
         source  # noqa: B018
         grid[:] = 0.0
-        ny, nz = shape[1], shape[last]
-        depth = 3 if DIM == 3 else 1
+        ny, nz = shape[1] if DIM == 3 else 1, shape[last]
         for back in range(2):
             for p in range(x.shape[0]):
-                m = mass[p]
-                gx, gz = (x[p, 0] - low[0]) * inv_dx, (x[p, last] - low[last]) * inv_dx
-                gy = (x[p, 1] - low[1]) * inv_dx if DIM == 3 else 0.0
-                i, j, k = int(gx + 0.5), int(gy + 0.5), int(gz + 0.5)
-                wx, wy, wz = spline(gx - i + 1.0), spline(gy - j + 1.0), spline(gz - k + 1.0)
+                first, wx, _, wz, _, wy, _ = reach(x, p, low, inv_dx, shape)
+                moved = mass[p] * four(1.0, u[p, 0], u[p, 1], u[p, 2] if DIM == 3 else 0.0)
+                seen = four(0.0, 0.0, 0.0, 0.0)
                 for a in range(3):
-                    for b in range(depth):
-                        row = (i + a) * nz + k if DIM == 2 else ((i + a) * ny + j + b) * nz + k
-                        wab = pick(wx, a) * (pick(wy, b) if DIM == 3 else 1.0)
+                    for b in range(DEPTH):
+                        row = first + (a * ny + b) * nz
+                        wab = pick(wx, a) * pick(wy, b)
                         for c in range(3):
-                            w = wab * pick(wz, c)
+                            w, node = wab * pick(wz, c), row + c
                             if back == 0:
-                                grid[row + c, 0] += w * m
-                                for d in range(DIM):
-                                    grid[row + c, 1 + d] += w * m * u[p, d]
-                            elif grid[row + c, 0] > 0.0:
-                                for d in range(DIM):
-                                    grid[row + c, FORCE + d] = grid[row + c, 1 + d] / grid[row + c, 0]
-                                    u[p, d] -= w * grid[row + c, FORCE + d]
+                                store(grid, node, 0, load(grid, node, 0) + w * moved)
+                            elif grid[node, 0] > 0.0:
+                                seen += (w / grid[node, 0]) * load(grid, node, 0)
+                u[p, 0] -= lane(seen, 1)
+                u[p, 1] -= lane(seen, 2)
+                if DIM == 3:
+                    u[p, 2] -= lane(seen, 3)
 
     return Transfer(scatter, gather, order, project)

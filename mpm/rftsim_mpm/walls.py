@@ -11,6 +11,7 @@ import numpy as np
 from numba import njit
 
 from rftsim_mpm.compiled import FASTMATH, SOURCE
+from rftsim_mpm.lanes import four, load, store
 from rftsim_mpm.transfer import CHANGE, FORCE, MOMENTUM, OPTIONS, VELOCITY
 
 
@@ -78,12 +79,12 @@ def make_grid_step(dim: int) -> Any:
         """Turn mass, momentum and force into the new velocity and its change.
 
         Args:
-            grid: (nnode, 1 + 2 dim), as `scatter` and the contacts leave it; gravity is added to its forces.
+            grid: (nnode, ROW), as `scatter` and the contacts leave it; gravity is added to its forces.
             shape: Nodes along each axis, (dim,); at least 7.
             gravity: (dim,) [m/s^2].
             dt: [s].
             friction: Of the lower and the upper wall across each axis, (dim, 2).
-            flow: Filled: new velocity and its change, (nnode, 2 dim).
+            flow: Filled: new velocity and its change, (nnode, ROW).
             impulse: Filled: impulse of each wall on the sand, (dim, 2, dim) [N s].
         """
         source  # noqa: B018
@@ -91,9 +92,9 @@ def make_grid_step(dim: int) -> Any:
         at = np.zeros(DIM, np.int64)
         at[DIM - 1] = -1
         found = np.ones((1 << DIM, 1 + DIM), np.int64)
+        weight = four(0.0, gravity[0], gravity[1], gravity[2] if DIM == 3 else 0.0)
         for node in range(grid.shape[0]):
-            for a in range(DIM):
-                grid[node, FORCE + a] += grid[node, 0] * gravity[a]
+            store(grid, node, 4, load(grid, node, 4) + grid[node, 0] * weight)
         for node in range(grid.shape[0]):
             axis = DIM - 1
             at[axis] += 1
@@ -107,10 +108,9 @@ def make_grid_step(dim: int) -> Any:
             if not beside:
                 mass = grid[node, 0]
                 inverse = 1.0 / mass if mass > 0.0 else 0.0
-                for a in range(DIM):
-                    change = grid[node, FORCE + a] * inverse * dt
-                    flow[node, VELOCITY + a] = grid[node, MOMENTUM + a] * inverse + change
-                    flow[node, CHANGE + a] = change
+                change = (dt * inverse) * load(grid, node, 4)
+                store(flow, node, 0, inverse * load(grid, node, 0) + change)
+                store(flow, node, 4, change)
                 continue
             images = mirrored(shape, at, found)
             mass = 0.0
@@ -124,12 +124,12 @@ def make_grid_step(dim: int) -> Any:
                 if mass <= 0.0 or at[a] == 1 or at[a] == shape[a] - 2:
                     momentum, force = 0.0, 0.0
                 inverse = 1.0 / mass if mass > 0.0 else 0.0
-                change = force * inverse * dt
-                flow[node, VELOCITY + a] = momentum * inverse + change
-                flow[node, CHANGE + a] = change
+                gained = force * inverse * dt
+                flow[node, VELOCITY + a] = momentum * inverse + gained
+                flow[node, CHANGE + a] = gained
                 if at[a] <= 2 or at[a] >= shape[a] - 3:
                     side = 0 if at[a] <= 2 else 1
-                    impulse[a, side, a] += grid[node, 0] * change - dt * grid[node, FORCE + a]
+                    impulse[a, side, a] += grid[node, 0] * gained - dt * grid[node, FORCE + a]
         for a in range(DIM):
             for side in range(2):
                 if friction[a, side] > 0.0:
