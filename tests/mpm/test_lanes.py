@@ -3,13 +3,12 @@
 import numpy as np
 import pytest
 from numba import njit
-
 from rftsim_mpm.lanes import four, lane, load, store
 
 
 @njit
 def weigh(rows, weights, first):
-    """Multiply the four that begin at a column of each row by its weight, add (0, 1, 2, 3); returns their sum's last."""
+    """Four of each row, from a column on: times a weight, plus (0, 1, 2, 3); returns the last of their sum."""
     total = four(0.0, 0.0, 0.0, 0.0)
     for i in range(rows.shape[0]):
         new = weights[i] * load(rows, i, first) + four(0.0, 1.0, 2.0, 3.0)
