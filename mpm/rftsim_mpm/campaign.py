@@ -1,7 +1,7 @@
-"""A grid of plates as independent jobs: one result file each, written whole or not at all.
+"""A grid of plates or pushes as independent jobs: one result file each, written whole or not at all.
 
-A campaign is a folder: `manifest.json` says what belongs to it, `results/KEY.json` holds one plate's result with its
-own checksum, KEY being made from the plate. What is there and whole is never computed again, so a campaign that was
+A campaign is a folder: `manifest.json` says what belongs to it, `results/KEY.json` holds one job's result with its
+own checksum, KEY being made from the job. What is there and whole is never computed again, so a campaign that was
 stopped in any way, SIGKILL included, goes on where it was.
 """
 
@@ -22,27 +22,36 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from rftsim_mpm import plate, push
 from rftsim_mpm.errors import MpmError
 from rftsim_mpm.output import replacing
-from rftsim_mpm.plate import Plate, PlateForce, measure
+from rftsim_mpm.plate import Plate
+from rftsim_mpm.push import Push
+from rftsim_mpm.reading import History
+
+Job = Plate | Push
+KINDS: dict[str, type[Job]] = {"plates": Plate, "pushes": Push}
+"""By what they are called in files."""
 
 POINTS = 100
 """Points of the force's history that a result keeps."""
 
 
 class Status(NamedTuple):
-    """Keys of a campaign's plates, by what is on the disk."""
+    """Keys of a campaign's jobs, by what is on the disk."""
 
     finished: list[str]
     missing: list[str]
     damaged: list[str]
 
 
-def read_plates(path: Path) -> list[Plate]:
-    """The plates of a TOML file: under `[[plates]]`, each list is an axis of a grid; `[defaults]` holds for all.
+def read_jobs(path: Path) -> list[Job]:
+    """What a TOML file asks for: each list under `[[plates]]` or `[[pushes]]` is an axis of a grid.
+
+    `[defaults]` holds for all.
 
     Raises:
-        MpmError: The file is missing, is no TOML, names what a plate does not have, or a plate cannot be.
+        MpmError: The file is missing, is no TOML, names what a job does not have, or a job cannot be.
     """
     try:
         text = tomllib.loads(path.read_text())
@@ -50,95 +59,110 @@ def read_plates(path: Path) -> list[Plate]:
         raise MpmError(f"cannot read {path}: {error.strerror}") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise MpmError(f"{path} is not TOML: {error}") from error
-    known = {field.name for field in dataclasses.fields(Plate)}
-    defaults, grids = text.get("defaults", {}), text.get("plates", [])
-    if not isinstance(defaults, dict) or not isinstance(grids, list) or not grids or set(text) - {"defaults", "plates"}:
-        raise MpmError(f"{path} must have one or more [[plates]], and may have [defaults], and nothing else")
-    found: dict[str, Plate] = {}
-    for grid in grids:
+    defaults = text.pop("defaults", {})
+    grids = [(name, grid) for name in KINDS if isinstance(text.get(name), list) for grid in text[name]]
+    if not isinstance(defaults, dict) or not grids or set(text) - set(KINDS):
+        raise MpmError(
+            f"{path} must have one or more [[plates]] or [[pushes]], and may have [defaults], and nothing else"
+        )
+    found: dict[str, Job] = {}
+    for name, grid in grids:
+        known = {field.name for field in dataclasses.fields(KINDS[name])}
         if unknown := (set(grid) | set(defaults)) - known:
-            raise MpmError(f"{path}: a plate has no {', '.join(sorted(unknown))}; it has {', '.join(sorted(known))}")
+            raise MpmError(
+                f"{path}: one of [[{name}]] has no {', '.join(sorted(unknown))}; it has {', '.join(sorted(known))}"
+            )
         axes = {name: value if isinstance(value, list) else [value] for name, value in (defaults | grid).items()}
         for values in itertools.product(*axes.values()):
-            plate = _plate(dict(zip(axes, values, strict=True)), str(path))
-            found[key(plate)] = plate
+            job = _job(KINDS[name], dict(zip(axes, values, strict=True)), str(path))
+            found[key(job)] = job
     return list(found.values())
 
 
-def _plate(values: dict[str, Any], where: str) -> Plate:
-    types = {field.name: field.type for field in dataclasses.fields(Plate)}
+def _job(kind: type[Job], values: dict[str, Any], where: str) -> Job:
+    types = {field.name: field.type for field in dataclasses.fields(kind)}
     for name, value in values.items():
-        kind = types[name] if types[name] in (int, bool) else float
-        if isinstance(value, bool) != (kind is bool) or not isinstance(value, int if kind is int else (int, float)):
+        wanted: Any = types[name] if types[name] in (int, bool, str) else float
+        numbers = isinstance(value, int if wanted is int else (int, float)) and isinstance(value, bool) == (
+            wanted is bool
+        )
+        if not (isinstance(value, str) if wanted is str else numbers):
             raise MpmError(f"{where}: {name} cannot be {value!r}")
-        values[name] = float(value) if kind is float else value
+        values[name] = float(value) if wanted is float else value
     try:
-        return Plate(**values)
+        return kind(**values)
     except MpmError as error:
         raise MpmError(f"{where}: {error}") from error
 
 
-def key(plate: Plate) -> str:
-    """Name of a plate's result: the beginning of the hash of everything that defines it."""
-    return hashlib.sha256(_canonical(dataclasses.asdict(plate)).encode()).hexdigest()[:16]
+def key(job: Job) -> str:
+    """Name of a job's result: the beginning of the hash of everything that defines it."""
+    return hashlib.sha256(_canonical(dataclasses.asdict(job)).encode()).hexdigest()[:16]
 
 
 def _canonical(value: Any) -> str:
     return json.dumps(value, sort_keys=True, separators=(",", ":"))
 
 
-def begin(folder: Path, plates: list[Plate]) -> None:
-    """Make a campaign's folder, or add plates to one."""
+def begin(folder: Path, jobs: list[Job]) -> None:
+    """Make a campaign's folder, or add jobs to one."""
     try:
         (folder / "results").mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise MpmError(f"cannot make the folder {folder}: {error.strerror}") from error
-    known = {key(plate): plate for plate in (manifest(folder) if (folder / "manifest.json").exists() else [])}
-    known |= {key(plate): plate for plate in plates}
-    text = {"plates": {name: dataclasses.asdict(plate) for name, plate in known.items()}}
+    known = {key(job): job for job in (manifest(folder) if (folder / "manifest.json").exists() else [])}
+    known |= {key(job): job for job in jobs}
+    text = {
+        name: {own: dataclasses.asdict(job) for own, job in known.items() if isinstance(job, kind)}
+        for name, kind in KINDS.items()
+    }
     with replacing(folder / "manifest.json") as temporary:
-        temporary.write_text(json.dumps(text, indent=1) + "\n")
+        temporary.write_text(json.dumps({name: jobs for name, jobs in text.items() if jobs}, indent=1) + "\n")
 
 
-def manifest(folder: Path) -> list[Plate]:
-    """The plates that belong to a campaign."""
+def manifest(folder: Path) -> list[Job]:
+    """The jobs that belong to a campaign."""
     path = folder / "manifest.json"
     try:
-        plates = [_plate(values, str(path)) for values in _dropped(json.loads(path.read_text())["plates"])]
+        text = json.loads(path.read_text())
+        jobs = [
+            _job(KINDS[name], {field: value for field, value in values.items() if value is not None}, str(path))
+            for name in text
+            for values in text[name].values()
+        ]
     except OSError as error:
         raise MpmError(f"{folder} is no campaign: cannot read {path.name} ({error.strerror})") from error
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise MpmError(f"{path} is damaged: {error}; run the campaign's TOML file again") from error
-    return plates
-
-
-def _dropped(plates: dict[str, dict[str, Any]]) -> list[dict[str, Any]]:
-    """The plates' settings without those that are not given, so that they are what a TOML file can say."""
-    return [{name: value for name, value in plate.items() if value is not None} for plate in plates.values()]
+    return jobs
 
 
 def status(folder: Path) -> Status:
     """What is on the disk."""
     found = Status([], [], [])
-    for plate in manifest(folder):
-        name = key(plate)
+    for job in manifest(folder):
+        name = key(job)
         path = folder / "results" / f"{name}.json"
-        (found.missing if not path.exists() else found.finished if whole(path, plate) else found.damaged).append(name)
+        (found.missing if not path.exists() else found.finished if whole(path, job) else found.damaged).append(name)
     return found
 
 
-def whole(path: Path, plate: Plate) -> bool:
-    """Whether a result is what was written, and of this plate."""
+def whole(path: Path, job: Job) -> bool:
+    """Whether a result is what was written, and of this job."""
     try:
         text = json.loads(path.read_text())
         checksum = text.pop("sha256")
     except (OSError, ValueError, KeyError, AttributeError):
         return False
-    return bool(checksum == _checksum(text) and text["plate"] == dataclasses.asdict(plate))
+    return bool(checksum == _checksum(text) and text[_name(job)] == dataclasses.asdict(job))
+
+
+def _name(job: Job) -> str:
+    return type(job).__name__.lower()
 
 
 def results(folder: Path) -> list[dict[str, Any]]:
-    """Every finished result: `plate`, and what `rftsim-mpm plate` reports of it."""
+    """Every finished result: `plate` or `push`, and what the command of that name reports of it."""
     names = set(status(folder).finished)
     return [json.loads((folder / "results" / f"{name}.json").read_text()) for name in sorted(names)]
 
@@ -147,30 +171,24 @@ def _checksum(value: Any) -> str:
     return hashlib.sha256(_canonical(value).encode()).hexdigest()
 
 
-def compute(plate: Plate, beat: Callable[[], None] | None = None) -> dict[str, Any]:
+def compute(job: Job, beat: Callable[[], None] | None = None) -> dict[str, Any]:
     """One result; `beat` is called at every step."""
-    return _result(plate, measure(plate, None if beat is None else lambda sim, share: beat()))
-
-
-def _result(plate: Plate, found: PlateForce) -> dict[str, Any]:
-    history = found.history
-    some = np.linspace(0, len(history.travel) - 1, min(POINTS, len(history.travel))).astype(int)
+    watch = None if beat is None else lambda sim, share: beat()
+    found = push.measure(job, watch) if isinstance(job, Push) else plate.measure(job, watch)
     result = {
-        "plate": dataclasses.asdict(plate),
-        "young_Pa": plate.material.young,
-        "force": found.force.tolist(),
-        "alpha_N_m3": found.alpha.tolist(),
-        "alpha_face_N_m3": (found.face / (plate.area * plate.z)).tolist(),
-        "depth_m": found.depth,
-        "noise": found.noise,
-        "heave_m": found.heave,
-        "travel_m": [float(f"{x:.6g}") for x in history.travel[some]],
-        "history": [[float(f"{x:.5g}") for x in row] for row in history.force[some]],
-        "particles": found.particles,
-        "steps": found.steps,
-        "seconds": round(found.seconds, 1),
+        _name(job): dataclasses.asdict(job),
+        **found.report,
+        **_thinned(found.history),
     }
     return {**result, "sha256": _checksum(result)}
+
+
+def _thinned(history: History) -> dict[str, Any]:
+    some = np.linspace(0, len(history.travel) - 1, min(POINTS, len(history.travel))).astype(int)
+    return {
+        "travel_m": [float(f"{x:.6g}") for x in history.travel[some]],
+        "history": [[float(f"{x:.5g}") for x in row] for row in history.force[some]],
+    }
 
 
 def write(folder: Path, name: str, result: dict[str, Any]) -> None:
@@ -191,7 +209,7 @@ def alone(folder: Path) -> Iterator[None]:
 
 
 def run(folder: Path, processes: int, done: Callable[[str], None]) -> list[str]:
-    """Compute what is not there, or is damaged, each plate in a process of its own with one thread.
+    """Compute what is not there, or is damaged, each job in a process of its own with one thread.
 
     Args:
         folder: The campaign.
@@ -199,7 +217,7 @@ def run(folder: Path, processes: int, done: Callable[[str], None]) -> list[str]:
         done: Called with each key as its result appears.
 
     Returns:
-        What failed, one line for each plate.
+        What failed, one line for each job.
     """
     now = status(folder)
     waiting, failed = [*now.damaged, *now.missing], []
@@ -240,13 +258,13 @@ def run_on_ray(folder: Path, address: str | None, done: Callable[[str], None]) -
         now = status(folder)
         wanted = {*now.damaged, *now.missing}
         remote = ray.remote(num_cpus=1, max_retries=2)(compute)
-        jobs = {remote.remote(plate): key(plate) for plate in manifest(folder) if key(plate) in wanted}
+        running = {remote.remote(job): key(job) for job in manifest(folder) if key(job) in wanted}
         failed = []
-        while jobs:
-            (job,), _ = ray.wait(list(jobs), num_returns=1)
-            name = jobs.pop(job)
+        while running:
+            (done_now,), _ = ray.wait(list(running), num_returns=1)
+            name = running.pop(done_now)
             try:
-                write(folder, name, ray.get(job))
+                write(folder, name, ray.get(done_now))
             except ray.exceptions.RayError as error:
                 failed.append(f"{name}: {str(error).strip().splitlines()[-1]}")
             else:

@@ -4,7 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import ConvexHull
 
+from rftsim_mpm.body import Body
 from rftsim_mpm.simulation import Simulation
 
 Array = NDArray[np.float64]
@@ -29,7 +31,7 @@ class Frame(NamedTuple):
     surface: Array
     """Free surface: the top of the highest particle in each column of cells, (m, 2) [m]."""
     outlines: list[Array]
-    """Each body's outline or, in three dimensions, its corners, (k, 2) [m]."""
+    """Each body's outline or, in three dimensions, the hull of its side view, (k, 2) [m]."""
 
 
 class Camera:
@@ -59,14 +61,20 @@ class Camera:
             packing=p.packing[seen],
             velocity=p.v[seen],
             surface=free_surface(p.x[seen][:, [0, -1]], p.volume[seen] ** (1.0 / p.dim), sim.dx),
-            outlines=[body.vertices[:, [0, -1]] for body in sim.bodies],
+            outlines=[_outline(body) for body in sim.bodies],
         )
+
+
+def _outline(body: Body) -> Array:
+    corners: Array = body.vertices[:, [0, -1]]
+    return corners if body.shape.dim == 2 else corners[ConvexHull(corners).vertices]
 
 
 def free_surface(place: Array, size: Array, dx: float) -> Array:
     """Height of the sand in each column of cells that has any, (m, 2): half a particle above the highest centre.
 
-    A particle alone in its cell, with none below it within two cells, is in the air and is not counted.
+    What lies above a gap of more than two cells is in the air and is not counted, unless it is thicker than the gap:
+    then a body is below it.
     """
     column, height = np.floor(place[:, 0] / dx).astype(np.int64), place[:, 1]
     order = np.lexsort((height, column))
@@ -76,9 +84,9 @@ def free_surface(place: Array, size: Array, dx: float) -> Array:
     loose = ~first & (gap > 2.0 * dx)
     group = np.cumsum(first) - 1
     broken = np.zeros(len(column), bool)
-    for i in np.flatnonzero(loose):  # rare: everything above a gap is in the air
+    for i in np.flatnonzero(loose):
         end = np.searchsorted(group, group[i], side="right")
-        broken[i:end] = True
+        broken[i:end] |= height[end - 1] - height[i] < gap[i]
     kept = np.flatnonzero(~broken)
     last = kept[np.flatnonzero(np.diff(column[kept], append=column[kept][-1] + 1) != 0)]
     return np.column_stack([(column[last] + 0.5) * dx, height[last] + 0.5 * size[last]])

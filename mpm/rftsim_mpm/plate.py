@@ -6,24 +6,21 @@ along (cos g, 0, -sin g), for b = beta, g = gamma and p = psi.
 
 import dataclasses
 import math
-import time
-from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rftsim_mpm.bed import level_bed
 from rftsim_mpm.body import Body, plane_rotation, turned
+from rftsim_mpm.course import Course, Watch
 from rftsim_mpm.errors import MpmError
 from rftsim_mpm.fields import Camera
 from rftsim_mpm.material import Material, stiffness
-from rftsim_mpm.reading import History, Log, limit, read
+from rftsim_mpm.reading import History, limit
 from rftsim_mpm.shapes import Surface, box, patches
 from rftsim_mpm.simulation import Simulation
 
 Array = NDArray[np.float64]
-Watch = Callable[[Simulation, float], None]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -103,6 +100,11 @@ class Plate:
             )
 
     @property
+    def quick(self) -> "Plate":
+        """The same with six cells, and less sand around: a look, not a measurement."""
+        return dataclasses.replace(self, cells=6.0, bed=0.7 * self.bed)
+
+    @property
     def dx(self) -> float:
         """Size of a cell [m]."""
         return self.length / self.cells
@@ -162,8 +164,8 @@ class PlateForce(NamedTuple):
     """Of the sand on the plate at the reading, (dim,) [N, in the plane N/m]."""
     alpha: Array
     """Force per area and depth, (dim,) [N/m^3]."""
-    face: Array
-    """Force on the leading face alone, without edges and back, (dim,)."""
+    alpha_face: Array
+    """The same of the leading face alone, without edges and back, (dim,) [N/m^3]."""
     depth: float
     """Of the leading face's centre [m]."""
     noise: float
@@ -178,50 +180,54 @@ class PlateForce(NamedTuple):
     seconds: float
     """Of computing."""
 
+    @property
+    def report(self) -> dict[str, Any]:
+        """What files keep of it."""
+        return {
+            "force": self.force.tolist(),
+            "depth_m": self.depth,
+            "alpha_N_m3": self.alpha.tolist(),
+            "alpha_face_N_m3": self.alpha_face.tolist(),
+            "noise": self.noise,
+            "heave_m": self.heave,
+            "particles": self.particles,
+            "steps": self.steps,
+            "seconds": round(self.seconds, 2),
+        }
 
-def prepare(plate: Plate) -> tuple[Simulation, float, NDArray[np.bool_]]:
-    """The bed with the plate at its start.
 
-    Returns:
-        The simulation, the travel at the reading [m], and for each horizontal axis whether the plate is cut in half by
-        a mirror.
-    """
-    dim, dx, size = plate.dim, plate.dx, plate.length
-    grown = 2.0 * plate.early * dx
+def course(plate: Plate) -> Course:
+    """The plate's way."""
+    dim, size = plate.dim, plate.length
+    grown = 2.0 * plate.early * plate.dx
     shape = box(*([size + grown] * (dim - 1)), plate.thick + grown)
     rotation, direction = plate.rotation, plate.direction
     corners = shape.vertices @ rotation.T
     face = 0.5 * plate.thick * plate.leading  # centre of the leading face, from the plate's own
     above = plate.z + face[-1] - corners[:, -1].min()  # of the plate's lowest point on its way down to the reading
     from_surface = above / -direction[-1] if direction[-1] < 0.0 else math.inf
-    approach = from_surface if from_surface <= size else plate.buried * size
-    window = plate.window
     margin = plate.bed * spread(plate.mu_int) * size * (1.0 if dim == 2 else 0.6)
-    reach = np.abs(corners).max(axis=0)
-    sideways = abs(direction[0]) * (approach + window)
     mirror_x = dim == 3 and plate.symmetric and plate.beta == 0.0 and abs(plate.gamma) == 90.0 and plate.psi == 0.0
     mirror_y = dim == 3 and plate.symmetric and plate.psi in (0.0, 180.0, -180.0)
-    height = math.ceil((plate.z + max(reach[-1], 0.4 * size) + 0.6 * margin) / dx) * dx
-    beside = [math.ceil((margin + r) / dx) for r in reach[: dim - 1]]  # cells from the plate's middle to a wall
-    path = math.ceil(sideways / dx)
-    width = [(1 if mirror else 2) * n for mirror, n in zip((mirror_x, mirror_y), beside, strict=False)]
-    width[0] += path
-    middle = np.array(beside, float) * dx
-    if direction[0] < 0.0:
-        middle[0] += path * dx
-    mirrors = np.array([mirror_x, mirror_y][: dim - 1])
-    middle = np.where(mirrors, 0.0, middle + plate.shift * dx)
-    reading_at = np.array([*middle, height - plate.z]) - face
-    start = reading_at - approach * direction
-    start[: dim - 1] += np.where(mirrors, 0.0, approach * direction[: dim - 1])
-    body = Body(shape, start, plate.speed * direction, plate.mu_surf, rotation)
-    top = max(height + 0.5 * size, start[-1] + reach[-1] + 2 * dx, height - plate.z + 2.0 * reach[-1] + size)
-    material = plate.material
-    bed = level_bed(material, (*(n * dx for n in width), height), dx, ppc=plate.ppc)
-    dt = plate.courant * dx / material.wave_speed
-    sim = Simulation(material, bed, dx, (*(n * dx for n in width), top), bodies=[body], dt=dt, xpic=plate.xpic)
-    sim.clear_bodies()
-    return sim, approach, mirrors
+    return Course(
+        shape=shape,
+        rotation=rotation,
+        direction=direction,
+        speed=plate.speed,
+        friction=plate.mu_surf,
+        material=plate.material,
+        depth=plate.z + float(face[-1]),
+        approach=from_surface if from_surface <= size else plate.buried * size,
+        window=plate.window,
+        margin=margin,
+        bed=plate.z + max(float(np.abs(corners[:, -1]).max()), 0.4 * size) + 0.6 * margin,
+        dx=plate.dx,
+        mirrors=(mirror_x, mirror_y)[: dim - 1],
+        courant=plate.courant,
+        ppc=plate.ppc,
+        xpic=plate.xpic,
+        shift=tuple(plate.shift - face[: dim - 1] / plate.dx),
+    )
 
 
 def measure(plate: Plate, watch: Watch | None = None) -> PlateForce:
@@ -231,43 +237,24 @@ def measure(plate: Plate, watch: Watch | None = None) -> PlateForce:
         plate: What to do.
         watch: Called after each step with the simulation and the share of the way that is done.
     """
-    sim, approach, mirrors = prepare(plate)
-    share = 0.5 ** int(mirrors.sum())
-    window = plate.window
-    first = sim.bodies[0].position.copy()
-    descent = -float(plate.direction[-1])
-    level = first[-1] + 0.5 * plate.thick * plate.leading[-1] + plate.z - approach * descent  # of the sand at rest
-    log, traction, steps = Log(), np.zeros_like(sim.traction[0]), 0
-    began, travel = time.perf_counter(), 0.0
-    while travel < approach + window:
-        sim.step()
-        travel = float((sim.bodies[0].position - first) @ plate.direction)
-        depth = plate.z + (travel - approach) * descent
-        log.add(sim.time, travel, depth, sim.force[0] / share, sim.moment[0] / share)
-        if abs(travel - approach) <= window:
-            traction += sim.traction[0]
-            steps += 1
-        if watch is not None:
-            watch(sim, min(1.0, travel / (approach + window)))
-    history = log.history(plate.dim)
-    history.force[:, : plate.dim - 1][:, mirrors] = 0.0  # the image's share cancels it
-    force, noise = read(history, approach, window)
-    body, surface = sim.bodies[0], sim.surfaces[0]
+    way = course(plate)
+    found = way.run(watch)
+    body, surface = found.sim.bodies[0], found.sim.surfaces[0]
     leads = surface.normals @ body.to_local(body.position + plate.leading) > 0.999
-    face = body.rotation @ (-surface.areas[leads] @ traction[leads]) / (steps * share)
-    face[: plate.dim - 1][mirrors] = 0.0
+    face = found.whole * body.rotation @ (-surface.areas[leads] @ found.traction[leads])
+    face[: plate.dim - 1][np.array(way.mirrors)] = 0.0
     return PlateForce(
-        force=force,
-        face=face,
-        alpha=force / (plate.area * plate.z),
+        force=found.force,
+        alpha=found.force / (plate.area * plate.z),
+        alpha_face=face / (plate.area * plate.z),
         depth=plate.z,
-        noise=noise,
-        heave=_heave(sim, plate, level),
-        history=history,
-        profile=profile(body, surface, traction / steps, plate.dx),
-        particles=len(sim.particles),
-        steps=sim.steps,
-        seconds=time.perf_counter() - began,
+        noise=found.noise,
+        heave=_heave(found.sim, plate, way.level),
+        history=found.history._replace(depth=found.history.depth + plate.z - way.depth),
+        profile=profile(body, surface, found.traction, plate.dx),
+        particles=len(found.sim.particles),
+        steps=found.sim.steps,
+        seconds=found.seconds,
     )
 
 

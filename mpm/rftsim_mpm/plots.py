@@ -101,23 +101,28 @@ def plot_history(history: History, title: str, path: Path, frame: Frame | None =
 
 
 def plot_campaign(found: list[dict[str, Any]], path: Path) -> None:
-    """Draw force per area and depth, by component, against the direction of motion; a line for each plate and sand."""
-    groups: dict[tuple[float, float, float], list[tuple[float, list[float]]]] = {}
-    for result in found:
-        plate = result["plate"]
-        group = plate["beta"], plate["psi"], plate["mu_int"]
-        groups.setdefault(group, []).append((plate["gamma"], result["alpha_N_m3"]))
-    names = "xyz" if max(len(result["alpha_N_m3"]) for result in found) == 3 else "xz"
-    figure = Figure(figsize=(5 * len(names), 5.5), dpi=110, layout="constrained")
-    axes = figure.subplots(1, len(names), squeeze=False)[0]
-    for (beta, psi, mu), points in sorted(groups.items()):
-        gammas, alphas = zip(*sorted(points), strict=True)
+    """Draw force against the direction of motion, by component: of plates per area and depth, of pushes as it is."""
+    plates = [result for result in found if "plate" in result] or None
+    lines: dict[str, list[tuple[float, list[float]]]] = {}
+    for result in plates or found:
+        if plates:
+            job, value = result["plate"], [1e-6 * a for a in result["alpha_N_m3"]]
+            label, angle = f"β {job['beta']:g}°, ψ {job['psi']:g}°, μ {job['mu_int']:g}", job["gamma"]
+        else:
+            job, value = result["push"], result["force"]
+            label, angle = job["shape"], job["theta"]
+        lines.setdefault(label, []).append((angle, value))
+    dim = max(len(value) for line in lines.values() for _, value in line)
+    names = "xyz" if dim == 3 else "xz"
+    figure = Figure(figsize=(5 * dim, 5.5), dpi=110, layout="constrained")
+    axes = figure.subplots(1, dim, squeeze=False)[0]
+    for label, points in sorted(lines.items()):
+        angles, values = zip(*sorted(points), strict=True)
         for component, axis in enumerate(axes):
-            values = 1e-6 * np.array(alphas)[:, component]
-            axis.plot(gammas, values, marker="o", markersize=4, label=f"β {beta:g}°, ψ {psi:g}°, μ {mu:g}")
+            axis.plot(angles, np.array(values)[:, component], marker="o", markersize=4, label=label)
     for axis, name in zip(axes, names, strict=True):
-        axis.set_xlabel("direction of motion γ [°]")
-        axis.set_ylabel(f"α_{name} [MN/m³]")
+        axis.set_xlabel(f"direction of motion {'γ' if plates else 'θ'} [°]")
+        axis.set_ylabel(f"α_{name} [MN/m³]" if plates else f"F_{name} [N]")
         axis.grid(alpha=0.3)
     axes[-1].legend(fontsize=7, loc="center left", bbox_to_anchor=(1.0, 0.5))
     figure.savefig(path)

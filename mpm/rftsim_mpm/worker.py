@@ -1,4 +1,4 @@
-"""One plate of a campaign, in a process of its own: `python -m rftsim_mpm.worker FOLDER KEY PARENT`."""
+"""One job of a campaign, in a process of its own: `python -m rftsim_mpm.worker FOLDER KEY PARENT`."""
 
 import os
 import sys
@@ -14,8 +14,8 @@ def main(folder: Path, name: str, parent: int) -> None:
         if os.getppid() != parent:
             sys.exit(f"the campaign, process {parent}, is gone")
 
-    plate = next(plate for plate in manifest(folder) if key(plate) == name)
-    write(folder, name, compute(plate, beat))
+    job = next(job for job in manifest(folder) if key(job) == name)
+    write(folder, name, compute(job, beat))
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ import sys
 import time
 
 import pytest
-from rftsim_mpm.campaign import begin, key, manifest, read_plates, results, run, status
+from rftsim_mpm.campaign import begin, key, manifest, read_jobs, results, run, status
 from rftsim_mpm.errors import MpmError
 from rftsim_mpm.plate import Plate
 
@@ -32,23 +32,36 @@ def file(tmp_path):
 
 
 def test_lists_are_the_axes_of_a_grid(file):
-    plates = read_plates(file)
+    plates = read_jobs(file)
     assert [(plate.mu_int, plate.beta) for plate in plates] == [(0.4, 0.0), (0.4, 20.0), (0.4, 30.0)]
     assert all(plate.cells == 4.0 and isinstance(plate.cells, float) for plate in plates)
     assert len({key(plate) for plate in plates}) == 3
+
+
+def test_pushes_are_jobs_too(tmp_path):
+    """A sphere pushed along x is pushed back, and its mirror image at y = 0 leaves it one moment: that about y."""
+    path = tmp_path / "pushes.toml"
+    path.write_text("[[pushes]]\nshape = ['sphere']\ndx = 0.025\nbed = 0.4\ndepth = 0.1\ntravel = 0.01\nspeed = 0.4\n")
+    begin(tmp_path / "out", read_jobs(path))
+    assert run(tmp_path / "out", 1, lambda name: None) == []
+    (found,) = results(tmp_path / "out")
+    assert found["push"]["shape"] == "sphere"
+    assert found["force"][0] < 0.0
+    assert found["force"][1] == found["moment_N_m"][0] == found["moment_N_m"][2] == 0.0
 
 
 @pytest.mark.parametrize(
     ("text", "said"),
     [("plates = 3", "must have"), ("[[plates]]\nmu = 0.4", "no mu"), ("[[plates]]\nmu_int = 'x'", "cannot be 'x'"),
      ("[[plates]]\ndim = 2.5", "cannot be 2.5"), ("[[plates]]\nmu_int = [0.4, -1.0]", "mu_int must be"),
+     ("[[pushes]]\nshape = 3", "cannot be 3"), ("[[pushes]]\nbeta = 3", "no beta"),
      ("[[", "not TOML")],
 )  # fmt: skip
 def test_grids_that_cannot_be(tmp_path, text, said):
     path = tmp_path / "grid.toml"
     path.write_text(text)
     with pytest.raises(MpmError, match=said):
-        read_plates(path)
+        read_jobs(path)
     assert list(tmp_path.iterdir()) == [path]
 
 
@@ -82,7 +95,7 @@ def test_killed_and_resumed(file, tmp_path):
 
 def test_a_campaign_can_grow(file, tmp_path):
     """Plates are added; those that are known keep their keys, so their results."""
-    begin(tmp_path / "out", read_plates(file))
+    begin(tmp_path / "out", read_jobs(file))
     before = {key(plate) for plate in manifest(tmp_path / "out")}
     begin(tmp_path / "out", [dataclasses.replace(Plate(), mu_int=0.7)])
     after = {key(plate) for plate in manifest(tmp_path / "out")}

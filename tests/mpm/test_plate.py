@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from rftsim_mpm.errors import MpmError
 from rftsim_mpm.material import bearing_factor
-from rftsim_mpm.plate import Plate, finer, measure, prepare
+from rftsim_mpm.plate import Plate, course, finer, measure
 from rftsim_mpm.reading import History, limit, read
 from rftsim_mpm.shapes import box, patches
 
@@ -26,8 +26,9 @@ def test_the_plate_faces_and_moves_as_its_angles_say(dim, beta, gamma, psi):
     axes = [0, 1, 2] if dim == 3 else [0, 2]
     np.testing.assert_allclose(-plate.rotation[:, -1], face[axes], atol=1e-12)
     np.testing.assert_allclose(plate.direction, motion[axes], atol=1e-12)
-    sim, approach, mirrors = prepare(plate)
-    assert mirrors.tolist() == ([False] if dim == 2 else [False, psi == 0.0])
+    way = course(plate)
+    sim, approach = way.prepare(), way.approach
+    assert way.mirrors == ((False,) if dim == 2 else (False, psi == 0.0))
     body = sim.bodies[0]
     leading = face if face @ motion >= 0.0 else -face
     reading = body.position + approach * plate.direction + 0.5 * plate.thick * leading[axes]

@@ -1,4 +1,4 @@
-"""`rftsim-mpm campaign`: grids of plates."""
+"""`rftsim-mpm campaign`: grids of plates and pushes."""
 
 import dataclasses
 import os
@@ -10,7 +10,7 @@ import tyro
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from rftsim_mpm.campaign import Status, alone, begin, manifest, read_plates, results, run, run_on_ray, status
+from rftsim_mpm.campaign import Status, alone, begin, manifest, read_jobs, results, run, run_on_ray, status
 from rftsim_mpm.cli.report import print_json
 from rftsim_mpm.errors import MpmError
 from rftsim_mpm.output import check_writable, replacing
@@ -20,10 +20,10 @@ Folder = tyro.conf.Positional[Path]
 
 @dataclasses.dataclass(frozen=True)
 class Work:
-    """How the plates that are not there yet are computed."""
+    """How the jobs that are not there yet are computed."""
 
     processes: int = os.cpu_count() or 1
-    """Plates at a time, one thread each."""
+    """Jobs at a time, one thread each."""
     ray: str | None = None
     """Use Ray instead: "local", or the address of a cluster."""
     json: bool = False
@@ -43,7 +43,7 @@ class Work:
             with Progress(
                 *columns, TextColumn("left"), TimeRemainingColumn(), console=console, disable=self.json
             ) as bar:
-                task = bar.add_task("plates", total=left)
+                task = bar.add_task("jobs", total=left)
                 if self.ray is None:
                     failed = run(folder, self.processes, lambda name: bar.advance(task))
                 else:
@@ -57,31 +57,31 @@ class Work:
 
 @dataclasses.dataclass(frozen=True)
 class CampaignRun:
-    """Compute the plates of a TOML file; what is there already is kept.
+    """Compute the plates and pushes of a TOML file; what is there already is kept.
 
     Example: rftsim-mpm campaign run plates.toml out/plates
     """
 
     file: Folder
-    """TOML: [[plates]] whose lists are the axes of a grid, and [defaults] for all."""
+    """TOML: [[plates]] or [[pushes]] whose lists are the axes of a grid, and [defaults] for all."""
     folder: Folder
     """Where manifest.json and results/ go."""
     work: tyro.conf.OmitArgPrefixes[Work] = dataclasses.field(default_factory=Work)
     quick: bool = False
-    """Six cells per plate and less sand."""
+    """Coarser cells and less sand: a look, not a measurement."""
 
     def __call__(self) -> None:
         """Run."""
-        plates = read_plates(self.file)
+        jobs = read_jobs(self.file)
         if self.quick:
-            plates = [dataclasses.replace(plate, cells=6.0, bed=0.5 * plate.bed) for plate in plates]
-        begin(self.folder, plates)
+            jobs = [job.quick for job in jobs]
+        begin(self.folder, jobs)
         self.work(self.folder)
 
 
 @dataclasses.dataclass(frozen=True)
 class CampaignResume:
-    """Compute what a campaign lacks: unfinished plates, and results that are damaged."""
+    """Compute what a campaign lacks: unfinished jobs, and results that are damaged."""
 
     folder: Folder
     work: tyro.conf.OmitArgPrefixes[Work] = dataclasses.field(default_factory=Work)
@@ -119,7 +119,7 @@ class CampaignStatus:
 
 @dataclasses.dataclass(frozen=True)
 class CampaignVerify:
-    """Check every result against its checksum and its plate; exits with 1 where one is damaged."""
+    """Check every result against its checksum and its job; exits with 1 where one is damaged."""
 
     folder: Folder
     json: bool = False
@@ -143,7 +143,7 @@ Campaign = (
 
 @dataclasses.dataclass(frozen=True)
 class CampaignCommand:
-    """A grid of plates as independent processes; stop it in any way, and resume."""
+    """A grid of plates or pushes as independent processes; stop it in any way, and resume."""
 
     command: Campaign
 

@@ -10,11 +10,13 @@ from rftsim_mpm.cli.bench import Bench
 from rftsim_mpm.cli.campaign import CampaignCommand
 from rftsim_mpm.cli.case import CaseCommand
 from rftsim_mpm.cli.plate import PlateCommand
+from rftsim_mpm.cli.push import PushCommand
 from rftsim_mpm.cli.studies import CollapseCommand, DragCommand, WheelCommand
 from rftsim_mpm.errors import MpmError
 
 Command = (
     Annotated[PlateCommand, tyro.conf.subcommand("plate")]
+    | Annotated[PushCommand, tyro.conf.subcommand("push")]
     | Annotated[DragCommand, tyro.conf.subcommand("drag")]
     | Annotated[WheelCommand, tyro.conf.subcommand("wheel")]
     | Annotated[CaseCommand, tyro.conf.subcommand("case")]

@@ -40,7 +40,7 @@ class PlateCommand:
             check_writable(self.plot, ".png", ".pdf", ".svg")
         if self.record:
             check_writable(self.record, ".rrd")
-        plate = dataclasses.replace(self.plate, cells=6.0, bed=0.7 * self.plate.bed) if self.quick else self.plate
+        plate = self.plate.quick if self.quick else self.plate
         second = finer(plate) if self.extrapolate else None
         found, frame = self._run(plate)
         report = _report(plate, found)
@@ -96,15 +96,7 @@ def _report(plate: Plate, found: PlateForce) -> dict[str, Any]:
         **dataclasses.asdict(plate),
         "young_Pa": plate.material.young,
         "force_unit": _unit(plate),
-        "force": found.force.tolist(),
-        "depth_m": found.depth,
-        "alpha_N_m3": found.alpha.tolist(),
-        "alpha_face_N_m3": (found.face / (plate.area * plate.z)).tolist(),
-        "noise": found.noise,
-        "heave_m": found.heave,
-        "particles": found.particles,
-        "steps": found.steps,
-        "seconds": found.seconds,
+        **found.report,
         "particle_updates_per_s": found.particles * found.steps / found.seconds,
         "surface": {"place_m": found.profile[0].tolist(), "stress_Pa": found.profile[1].tolist()},
     }

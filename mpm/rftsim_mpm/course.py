@@ -1,0 +1,138 @@
+"""A body's straight way through a level bed, and the force on it at one place of the way."""
+
+import dataclasses
+import math
+import time
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rftsim_mpm.bed import level_bed
+from rftsim_mpm.body import Body
+from rftsim_mpm.material import Material
+from rftsim_mpm.reading import History, Log, read
+from rftsim_mpm.shapes import Shape
+from rftsim_mpm.simulation import COURANT, Simulation
+
+Array = NDArray[np.float64]
+Watch = Callable[[Simulation, float], None]
+
+
+@dataclasses.dataclass(frozen=True)
+class Course:
+    """What moves where."""
+
+    shape: Shape
+    rotation: Array
+    """From the shape's frame to the world, (dim, dim)."""
+    direction: Array
+    """Of the motion, (dim,); without a component along y."""
+    speed: float
+    """[m/s]."""
+    friction: float
+    """Between sand and body [-]."""
+    material: Material
+    """The sand."""
+    depth: float
+    """Of the shape's origin at the reading [m]."""
+    approach: float
+    """Travel before the reading [m]."""
+    window: float
+    """Half of the travel over which the force is read [m]."""
+    margin: float
+    """Sand beside the body's way, up to each wall [m]."""
+    bed: float
+    """Depth of the sand [m]."""
+    dx: float
+    """Size of a cell [m]."""
+    mirrors: tuple[bool, ...]
+    """For each horizontal axis, whether only the half beyond the shape's origin is there, the rest being its image."""
+    courant: float = COURANT
+    """Time step, in cells per wave."""
+    ppc: int = 2
+    """Particles per cell along each axis."""
+    xpic: int = 0
+    """Order of XPIC; 0 is FLIP."""
+    shift: tuple[float, ...] = (0.0, 0.0)
+    """Place of the body on the grid, along each horizontal axis [cells]."""
+
+    @property
+    def level(self) -> float:
+        """Height of the sand's surface at rest [m]."""
+        return math.ceil(self.bed / self.dx) * self.dx
+
+    def prepare(self) -> Simulation:
+        """The bed with the body at its start."""
+        dx, dim = self.dx, self.shape.dim
+        reach = np.abs(self.shape.vertices @ self.rotation.T).max(axis=0)
+        beside = [math.ceil((self.margin + r) / dx) for r in reach[: dim - 1]]  # cells from the body's middle to a wall
+        path = math.ceil(abs(self.direction[0]) * (self.approach + self.window) / dx)
+        width = [(1 if mirror else 2) * n for mirror, n in zip(self.mirrors, beside, strict=True)]
+        width[0] += path
+        start = np.array([*((n + s) * dx for n, s in zip(beside, self.shift, strict=False)), self.level - self.depth])
+        if self.direction[0] < 0.0:
+            start[0] += path * dx
+        start[: dim - 1][np.array(self.mirrors)] = 0.0
+        start[-1] -= self.approach * self.direction[-1]
+        end = start[-1] + (self.approach + self.window) * self.direction[-1]
+        top = max(self.level, start[-1] + reach[-1], end + reach[-1]) + reach.max() + 2.0 * dx
+        body = Body(self.shape, start, self.speed * self.direction, self.friction, self.rotation)
+        bed = level_bed(self.material, (*(n * dx for n in width), self.level), dx, ppc=self.ppc)
+        dt = self.courant * dx / self.material.wave_speed
+        box = (*(n * dx for n in width), top)
+        sim = Simulation(self.material, bed, dx, box, bodies=[body], dt=dt, xpic=self.xpic)
+        sim.clear_bodies()
+        return sim
+
+    def run(self, watch: Watch | None = None) -> "Passage":
+        """Move the body to a little beyond the reading.
+
+        Args:
+            watch: Called after each step with the simulation and the share of the way that is done.
+        """
+        sim = self.prepare()
+        whole = 2 ** sum(self.mirrors)
+        first = sim.bodies[0].position.copy()
+        log, traction, steps = Log(), np.zeros_like(sim.traction[0]), 0
+        began, travel = time.perf_counter(), 0.0
+        while travel < self.approach + self.window:
+            sim.step()
+            travel = float((sim.bodies[0].position - first) @ self.direction)
+            depth = self.depth - (travel - self.approach) * float(self.direction[-1])
+            log.add(sim.time, travel, depth, whole * sim.force[0], whole * sim.moment[0])
+            if abs(travel - self.approach) <= self.window:
+                traction += sim.traction[0]
+                steps += 1
+            if watch is not None:
+                watch(sim, min(1.0, travel / (self.approach + self.window)))
+        history = log.history(self.shape.dim)
+        for axis, mirror in enumerate(self.mirrors):
+            if mirror:  # the image's share cancels it
+                history.force[:, axis] = 0.0
+                history.moment[:, [i for i in range(history.moment.shape[1]) if i != axis]] = 0.0
+        force, noise = read(history, self.approach, self.window)
+        near = np.abs(history.travel - self.approach) <= self.window
+        seconds = time.perf_counter() - began
+        return Passage(sim, history, force, history.moment[near].mean(axis=0), noise, traction / steps, whole, seconds)
+
+
+class Passage(NamedTuple):
+    """What a body felt on its way."""
+
+    sim: Simulation
+    """As it was at the end."""
+    history: History
+    force: Array
+    """Of the sand on the body at the reading, (dim,) [N, in the plane N/m]."""
+    moment: Array
+    """About the shape's origin, (1,) or (3,) [N m]."""
+    noise: float
+    """Of averages over 0.5 ms, relative [-]."""
+    traction: Array
+    """Mean while reading, as `Simulation.traction` has it."""
+    whole: int
+    """How many times what was modelled the body is."""
+    seconds: float
+    """Of computing."""
