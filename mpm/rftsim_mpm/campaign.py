@@ -33,6 +33,8 @@ Job = Plate | Push
 KINDS: dict[str, type[Job]] = {"plates": Plate, "pushes": Push}
 """By what they are called in files."""
 
+DATA = Path(__file__).parent / "data"
+"""Campaigns that are shipped: `plates`, and `flat`."""
 POINTS = 100
 """Points of the force's history that a result keeps."""
 

@@ -164,8 +164,6 @@ class PlateForce(NamedTuple):
     """Of the sand on the plate at the reading, (dim,) [N, in the plane N/m]."""
     alpha: Array
     """Force per area and depth, (dim,) [N/m^3]."""
-    alpha_face: Array
-    """The same of the leading face alone, without edges and back, (dim,) [N/m^3]."""
     depth: float
     """Of the leading face's centre [m]."""
     noise: float
@@ -187,7 +185,6 @@ class PlateForce(NamedTuple):
             "force": self.force.tolist(),
             "depth_m": self.depth,
             "alpha_N_m3": self.alpha.tolist(),
-            "alpha_face_N_m3": self.alpha_face.tolist(),
             "noise": self.noise,
             "heave_m": self.heave,
             "particles": self.particles,
@@ -239,19 +236,14 @@ def measure(plate: Plate, watch: Watch | None = None) -> PlateForce:
     """
     way = course(plate)
     found = way.run(watch)
-    body, surface = found.sim.bodies[0], found.sim.surfaces[0]
-    leads = surface.normals @ body.to_local(body.position + plate.leading) > 0.999
-    face = found.whole * body.rotation @ (-surface.areas[leads] @ found.traction[leads])
-    face[: plate.dim - 1][np.array(way.mirrors)] = 0.0
     return PlateForce(
         force=found.force,
         alpha=found.force / (plate.area * plate.z),
-        alpha_face=face / (plate.area * plate.z),
         depth=plate.z,
         noise=found.noise,
         heave=_heave(found.sim, plate, way.level),
         history=found.history._replace(depth=found.history.depth + plate.z - way.depth),
-        profile=profile(body, surface, found.traction, plate.dx),
+        profile=profile(found.sim.bodies[0], found.sim.surfaces[0], found.traction, plate.dx),
         particles=len(found.sim.particles),
         steps=found.sim.steps,
         seconds=found.seconds,
