@@ -42,11 +42,11 @@ def points() -> list[tuple[str, str, float]]:
     return [(scene, law, rpm) for scene, rates in RATES.items() for rpm in rates for law in LAWS]
 
 
-def measure(scene: str, law: str, rpm: float) -> Point:
-    """Run one point."""
+def measure(scene: str, law: str, rpm: float, sand: str | None = None) -> Point:
+    """Run one point, on other sand than the scene's if so asked."""
     turn = 60 / rpm
     averaged = max(math.ceil(SHORTEST * STEADY / turn), 1) * turn  # whole turns, so that no lug counts twice
-    staged = stage(scene, law=law, settings={"rpm": str(rpm)}, duration=averaged / STEADY)
+    staged = stage(scene, sand=sand, law=law, settings={"rpm": str(rpm)}, duration=averaged / STEADY)
     finished = run(staged)
     radius = staged.measured.wheel_radius
     assert radius is not None, "the demonstration's scenes are wheels"

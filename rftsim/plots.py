@@ -13,6 +13,7 @@ from rftsim.bench.stability import FORCES, Row
 from rftsim.demo import Point
 from rftsim.render import render, watching
 from rftsim.run import STEADY, History
+from rftsim.validation.study import Measured, Study
 
 
 class Score(Protocol):
@@ -121,6 +122,13 @@ def plot_stability(rows: list[Row], path: Path) -> None:
         axis.legend(loc="lower right")
     left.text(steps[0] * 1e3, LOST, "lost", color="0.4", va="bottom")
     figure.suptitle(f"{len(rows)} hard cases, and their median (bold)")
+    figure.savefig(path, dpi=110)
+
+
+def plot_study(study: Study, measured: Measured, path: Path) -> None:
+    """Draw a study of `rftsim validate`."""
+    figure = Figure(figsize=study.size, layout="constrained")
+    study.draw(measured, figure)
     figure.savefig(path, dpi=110)
 
 

@@ -1,7 +1,5 @@
 """Stability against the time step: the hard cases at five steps under both forces, against the right answers."""
 
-import hashlib
-import json
 import math
 import statistics
 from collections.abc import Callable, Iterable, Mapping
@@ -14,6 +12,7 @@ import numpy as np
 from rftsim.bench import hard_cases
 from rftsim.bench.hard_cases import CASES, Force
 from rftsim.compiled import SOURCE
+from rftsim.kept import Kept
 from rftsim.readout import work
 
 STEPS: Final = (1e-4, 1e-3, 2e-3, 5e-3, 1e-2)
@@ -133,39 +132,19 @@ class Study:
 
     def __init__(self, path: Path) -> None:
         cases = Path(hard_cases.__file__).read_bytes() + Path(__file__).read_bytes()
-        self.path = path
-        self.key = hashlib.sha256(SOURCE.encode() + cases + mujoco.__version__.encode()).hexdigest()
-        self.known: dict[str, Any] = {}
-        if path.is_file():
-            kept = json.loads(path.read_text())
-            if kept.get("key") == self.key:
-                self.known = kept["known"]
-
-    def _remember(self, name: str, value: Any) -> None:
-        self.known[name] = value
-        temporary = self.path.with_suffix(".part")
-        temporary.write_text(json.dumps({"key": self.key, "known": self.known}))
-        temporary.replace(self.path)
+        self.kept = Kept(path, SOURCE.encode() + cases + mujoco.__version__.encode())
 
     def played(self, case: str, h: float, force: Force) -> Played:
         """A case, played now or before."""
-        name = f"{case}/{force}/{h:g}"
-        if name not in self.known:
-            self._remember(name, play(case, h, force))
-        return Played(*self.known[name])
+        return Played(*self.kept.get(f"{case}/{force}/{h:g}", lambda: play(case, h, force)))
 
     def expected(self, case: str) -> dict[str, float]:
         """The exact or converged values of a case."""
-        if f"{case}/expected" not in self.known:
-            self._remember(f"{case}/expected", references(case))
-        return dict(self.known[f"{case}/expected"])
+        return dict(self.kept.get(f"{case}/expected", lambda: references(case)))
 
     def starts(self, count: int, report: Callable[[], Any]) -> Starts:
         """The random starts."""
-        name = f"starts/{count}"
-        if name not in self.known:
-            self._remember(name, random_starts(count, report))
-        return Starts(*self.known[name])
+        return Starts(*self.kept.get(f"starts/{count}", lambda: random_starts(count, report)))
 
 
 class Row(NamedTuple):

@@ -16,6 +16,7 @@ from rftsim.cli.inspect import Inspect
 from rftsim.cli.play import Play
 from rftsim.cli.run import Run
 from rftsim.cli.train import Train
+from rftsim.cli.validate import Validate
 from rftsim.errors import RftsimError, RftsimWarning
 
 Command = (
@@ -24,6 +25,7 @@ Command = (
     | Annotated[Inspect, tyro.conf.subcommand("inspect")]
     | Annotated[Demo, tyro.conf.subcommand("demo")]
     | Annotated[Bench, tyro.conf.subcommand("bench")]
+    | Annotated[Validate, tyro.conf.subcommand("validate")]
     | Annotated[Train, tyro.conf.subcommand("train")]
     | Annotated[Play, tyro.conf.subcommand("play")]
     | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]

@@ -1,0 +1,328 @@
+"""Measured wheels and plates in dry sand: Pavlov and Johnson, CMU "3d-terramechanics" (MIT licence).
+
+A grousered wheel at imposed slip and slip angle, with its measured sinkage as input, against drawbar, side force and
+load; and circular plates pushed into the same sand. Strength and friction of the sand come from its density and its
+friction angle alone; nothing is fitted to the wheel.
+"""
+
+import csv
+import functools
+import hashlib
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from rftsim.errors import RftsimError
+from rftsim.sand import ALPHA_Z_PLATE, Sand, xi_n_cubic
+from rftsim.surface import Array
+from rftsim.validation import pockets, terramechanics
+from rftsim.validation.pockets import Grousers, Motion, Shaded
+from rftsim.validation.study import Measured, Request, Row, at_least, at_most, near
+from rftsim.validation.terramechanics import Soil
+
+WHEEL_FILE, PLATE_FILE = "cmu_wheel_grouser.csv", "cmu_circular_plate_sinkage.csv"
+SMOOTH_FILE: Final = "cmu_wheel_smooth.csv"
+"""A smooth wheel in the same sand, of the same columns; not among the data that come with the grousered one."""
+WHEEL: Final = Grousers(hub=0.0575, tip=0.0625, width=0.060, number=24, thickness=0.002)
+"""The thickness of the grousers is not published; 1 to 3 mm change an RMSE by less than 0.2 N."""
+SAND: Final = Sand(rho_c=1330.0, mu_int=math.tan(math.radians(29)), mu_surf=0.35)
+"""Strength from Table C.1."""
+CUBIC: Final = xi_n_cubic(1330.0, math.tan(math.radians(29))) / float(SAND.xi_n or math.nan)
+"""Strength by the cubic of Fig. C-2 over that of Table C.1."""
+PHASES: Final = 4
+MOST_SLIP, MOST_ANGLE_DEG = 0.55, 60.0
+FORCES: Final = ("drawbar", "side", "load")
+SHARES: Final = {"full grousers": 1.0, "one third": 1.0 / 3.0, "no grousers": 0.0}
+KNOWN: Final = {
+    "full grousers": (6.0, 2.7, 6.2),
+    "one third": (2.4, 3.7, 6.3),
+    "no grousers": (3.2, 4.3, 6.7),
+}
+"""RMSE of another implementation of 3D-RFT with the cubic strength [N]."""
+LEAST, SMOOTH = "least power", "smooth wheel"
+LITERATURE, OWN = "terramechanics, dry sand", "terramechanics, the plates"
+SOILS: Final = {
+    LITERATURE: "Wong-Reece; dry sand of [Wong2008] Table 2.3",
+    OWN: "Wong-Reece; n, k_c, k_φ of the plates, φ 29°, K 25 mm [Wong2008]",
+}
+ABSENT: Final = "data not here"
+DATA: Final = Path("../shared/data/cmu")
+"""Where the data are looked for."""
+
+
+class Runs(NamedTuple):
+    """Measured runs of a wheel, (n,) each; SI."""
+
+    slip: Array
+    angle: Array
+    """Slip angle [rad]."""
+    travel: Array
+    """[m/s]."""
+    rim: Array
+    """[m/s]."""
+    sinkage: Array
+    """Of the tips [m]."""
+    force: Array
+    """Drawbar, side and load [N], (n, 3)."""
+
+    def velocity(self, run: int) -> tuple[float, float]:
+        """Of the axle along and across the wheel's heading [m/s]."""
+        travel, angle = float(self.travel[run]), float(self.angle[run])
+        return travel * math.cos(angle), travel * math.sin(angle)
+
+    @property
+    def judged(self) -> Any:
+        """Runs that are compared: moderate slips and slip angles."""
+        return (np.abs(self.slip) <= MOST_SLIP) & (self.angle <= math.radians(MOST_ANGLE_DEG + 1e-6))
+
+
+def _columns(path: Path) -> dict[str, list[str]]:
+    with path.open(newline="") as file:
+        lines = list(csv.DictReader(file))
+    if not lines:
+        raise RftsimError(f"{path} has no rows")
+    return {name: [line[name] for line in lines] for name in lines[0]}
+
+
+def read_runs(path: Path) -> Runs:
+    """The runs in a wheel's file.
+
+    Raises:
+        RftsimError: The file lacks a column, or a number.
+    """
+    columns = _columns(path)
+    names = ("slip_ratio", "slip_angle_deg", "travel_speed_mm_s", "rim_speed_mm_s", "sinkage_mm")
+    forces = ("F_drawbar_N", "F_sidewall_N", "F_load_N")
+    for name in (*names, *forces):
+        if name not in columns:
+            raise RftsimError(f"{path} has no column {name}")
+    try:
+        slip, angle, travel, rim, sinkage, *force = (np.array(columns[n], dtype=float) for n in (*names, *forces))
+    except ValueError as error:
+        raise RftsimError(f"{path}: {error}") from error
+    return Runs(slip, np.radians(angle), travel / 1e3, rim / 1e3, sinkage / 1e3, np.column_stack(force))
+
+
+def jobs(request: Request) -> dict[str, Callable[[], Any]]:
+    """Every rule on every run, and the plates; what has no data says so."""
+    found: dict[str, Callable[[], Any]] = {}
+    wheel, plates = request.data / WHEEL_FILE, request.data / PLATE_FILE
+    if wheel.is_file():
+        mark = _digest(wheel)
+        for rule in (*SHARES, LEAST):
+            found[f"wheel {mark}/{rule}"] = functools.partial(by_force_law, rule, wheel)
+        soils = {LITERATURE: terramechanics.DRY_SAND} | ({OWN: soil_of_plates(plates)} if plates.is_file() else {})
+        for name, soil in soils.items():
+            found[f"wheel {mark}/{name}"] = functools.partial(by_terramechanics, soil, wheel)
+    smooth = request.data / SMOOTH_FILE
+    if smooth.is_file():
+        found[f"smooth {_digest(smooth)}/{SMOOTH}"] = functools.partial(by_force_law, SMOOTH, smooth)
+    if plates.is_file():
+        found[f"plates {_digest(plates)}"] = functools.partial(plate_stiffness, plates)
+    return found
+
+
+def _digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()[:12]
+
+
+def by_force_law(rule: str, wheel: Path) -> dict[str, Any]:
+    """Forces of every run that is judged, by 3D-RFT and a rule for the grousers; [N], (n, 3)."""
+    runs = read_runs(wheel)
+    shaded = Shaded(WHEEL)
+    solid = WHEEL.disc() if rule == SMOOTH else WHEEL.with_height(SHARES[rule]) if rule in SHARES else None
+    found = []
+    for k in np.flatnonzero(runs.judged):
+        velocity = np.array([*runs.velocity(int(k)), 0.0])
+        height, rate = WHEEL.tip - float(runs.sinkage[k]), float(runs.rim[k]) / WHEEL.tip
+        total = np.zeros(3)
+        for phase in range(PHASES):
+            motion = Motion(height, WHEEL.pitch * phase / PHASES, velocity, rate)
+            force = (
+                shaded.force(SAND, motion, "rft3d") if solid is None else pockets.force(solid, SAND, motion, "rft3d")
+            )
+            total += force / PHASES
+        found.append([float(total[0]), -float(total[1]), float(total[2])])
+    return {"force": found} | _compared(runs)
+
+
+def by_terramechanics(soil: Soil, wheel: Path) -> dict[str, Any]:
+    """The same by terramechanics, under the measured load, and the sinkage [m]."""
+    runs = read_runs(wheel)
+    found, sunk = [], []
+    for k in np.flatnonzero(runs.judged):
+        shape = WHEEL.tip, WHEEL.width
+        motion = float(runs.rim[k]), runs.velocity(int(k))
+        sinkage = terramechanics.sinkage_under(soil, float(runs.force[k, 2]), *shape, *motion)
+        force = terramechanics.wheel_force(soil, *shape, sinkage, *motion)
+        found.append([force.drawbar, -force.side, force.load])
+        sunk.append(sinkage)
+    return {"force": found, "sinkage": sunk} | _compared(runs)
+
+
+def _compared(runs: Runs) -> dict[str, Any]:
+    judged = runs.judged
+    return {
+        "measured": runs.force[judged].tolist(),
+        "measured_sinkage": runs.sinkage[judged].tolist(),
+        "slip": runs.slip[judged].tolist(),
+        "angle_deg": np.degrees(runs.angle[judged]).tolist(),
+    }
+
+
+def plate_stiffness(path: Path) -> dict[str, Any]:
+    """Stress over depth of each plate test, through the origin, and Bekker's parameters of all [SI]."""
+    found: dict[str, list[float]] = {}
+    for diameter, depth, force in _tests(path):
+        area = math.pi / 4 * diameter**2
+        found.setdefault(f"{1e3 * diameter:g}", []).append(float(depth @ force / (depth @ depth)) / area)
+    return {"alpha": found, "soil": list(soil_of_plates(path))}
+
+
+def _tests(path: Path) -> list[tuple[float, Array, Array]]:
+    """Diameter [m], depths [m] and forces [N] of each plate test."""
+    columns = _columns(path)
+    labels = list(zip(columns["box"], columns["trial"], columns["plate_diameter_mm"], strict=True))
+    depth, force = (np.array(columns[name], dtype=float) for name in ("depth_m", "force_N"))
+    tests = []
+    for label in dict.fromkeys(labels):
+        own = np.array([other == label for other in labels])
+        tests.append((float(label[2]) / 1e3, depth[own], force[own]))
+    return tests
+
+
+def soil_of_plates(path: Path) -> Soil:
+    """Bekker's soil from the plates in the same sand, [Agarwal] eq. (1.4).
+
+    ln p = ln(k_c / b + k_phi) + n ln z by least squares, b the plate's radius, less than 5 mm of depth left out.
+    """
+    rows, right = [], []
+    tests = _tests(path)
+    sizes = sorted({diameter for diameter, _, _ in tests})
+    for diameter, depth, force in tests:
+        deep = (depth > 0.005) & (force > 0.0)
+        pressure = force[deep] / (math.pi / 4 * diameter**2)
+        one_hot = [float(diameter == size) for size in sizes]
+        rows += [[*one_hot, z] for z in np.log(depth[deep])]
+        right += np.log(pressure).tolist()
+    *logs, exponent = np.linalg.lstsq(np.array(rows), np.array(right), rcond=None)[0]
+    radii = np.array(sizes) / 2
+    k_c, k_phi = np.polyfit(1.0 / radii, np.exp(logs), 1)
+    return Soil(
+        k_c=float(k_c),
+        k_phi=float(k_phi),
+        exponent=float(exponent),
+        friction=float(SAND.mu_int or math.nan),
+        shear=terramechanics.SHEAR_LOOSE,
+        tested=(float(radii[0]), float(radii[-1])),
+    )
+
+
+def _by_rule(measured: Measured, wheel: str = "wheel") -> dict[str, dict[str, Any]]:
+    return {name.partition("/")[2]: value for name, value in measured.items() if name.startswith(f"{wheel} ")}
+
+
+def _plates(measured: Measured) -> dict[str, Any] | None:
+    return next((value for name, value in measured.items() if name.startswith("plates ")), None)
+
+
+def rmse(found: dict[str, Any], factor: float = 1.0) -> dict[str, float]:
+    """Root of the mean square error of each force [N], with the prediction times a factor."""
+    error = factor * np.array(found["force"]) - np.array(found["measured"])
+    return dict(zip(FORCES, np.sqrt((error**2).mean(axis=0)).tolist(), strict=True))
+
+
+def rows(measured: Measured) -> list[Row]:
+    """The wheel by each rule, and the plates."""
+    smooth = [
+        Row(f"{SMOOTH}: {name} RMSE", value, "measured; ξ_n by Table C.1", unit="N", note="radius taken as 62.5 mm")
+        for found in _by_rule(measured, "smooth").values()
+        for name, value in rmse(found).items()
+    ]
+    return [*_wheel_rows(_by_rule(measured)), *smooth, *_plate_rows(_plates(measured))]
+
+
+def _wheel_rows(found: dict[str, dict[str, Any]]) -> list[Row]:
+    if not found:
+        return [Row("grousered wheel", None, f"{ABSENT}; --data DIR with {WHEEL_FILE}")]
+    rows = []
+    demand = "measured; ξ_n by Table C.1"
+    for rule, known in KNOWN.items():
+        own = rmse(found[rule], CUBIC)
+        off = max(abs(own[name] - value) for name, value in zip(FORCES, known, strict=True))
+        what = f"{rule}: RMSE less another program's {' / '.join(map(str, known))} N, largest"
+        rows.append(at_most(what, off, 0.3, "another 3D-RFT program; ξ_n by the cubic", unit="N"))
+    full = rmse(found["full grousers"])
+    for rule in ("one third", LEAST):
+        own = rmse(found[rule])
+        note = "each pocket flows or is carried along, whichever costs less" if rule == LEAST else ""
+        gain = full["drawbar"] / own["drawbar"]
+        rows += [
+            Row(f"{rule}: drawbar RMSE", own["drawbar"], demand, unit="N", note=note),
+            at_least(f"{rule}: drawbar RMSE with full grousers over that", gain, 2.0, demand),
+            at_most(f"{rule}: side RMSE", own["side"], 4.0, demand, unit="N"),
+            at_most(f"{rule}: load RMSE", own["load"], 6.5, demand, unit="N"),
+        ]
+    for rule, source in SOILS.items():
+        if rule in found:
+            one, own = found[rule], rmse(found[rule])
+            sunk = 1e3 * (np.array(one["sinkage"]) - np.array(one["measured_sinkage"]))
+            rows += [
+                *(Row(f"{rule}, load given: {name} RMSE", own[name], source, unit="N") for name in FORCES[:2]),
+                Row(f"{rule}, load given: sinkage RMSE", float(np.sqrt((sunk**2).mean())), source, unit="mm"),
+            ]
+    return rows
+
+
+def _plate_rows(found: dict[str, Any] | None) -> list[Row]:
+    if found is None:
+        return [Row("circular plates", None, f"{ABSENT}; --data DIR with {PLATE_FILE}")]
+    predicted = 1e-6 * ALPHA_Z_PLATE * float(SAND.xi_n or math.nan)
+    note = "measured stiffness grows with the plate near the surface, which RFT cannot show"
+    rows = []
+    for diameter, values in sorted(found["alpha"].items(), key=lambda item: float(item[0])):
+        mean = 1e-6 * float(np.mean(values))
+        what = f"plate of {diameter} mm: α_z"
+        source = f"measured, {len(values)} tests"
+        rows.append(near(what, predicted, mean, 0.15 * mean, source, unit="MN/m³", note=note))
+    return rows
+
+
+def draw(measured: Measured, figure: Any) -> None:
+    """Forces over slip at each slip angle, measured and by rule; and the RMSE."""
+    found = _by_rule(measured)
+    if not found:
+        figure.text(0.5, 0.5, f"{ABSENT}: --data DIR", ha="center")
+        return
+    some = next(iter(found.values()))
+    angles = sorted(set(np.round(some["angle_deg"], 6)))
+    panels = figure.subplots(3, len(angles), sharex=True, sharey="row")
+    colours = dict(zip((*SHARES, LEAST, *SOILS), ("C3", "C0", "0.6", "C2", "C1", "C4"), strict=True))
+    for column, angle in enumerate(angles):
+        own = np.isclose(some["angle_deg"], angle)
+        slip = np.array(some["slip"])[own]
+        steps = np.unique(np.round(slip, 1))
+        groups = [np.isclose(np.round(slip, 1), step) for step in steps]
+        for row, name in enumerate(FORCES):
+            axis = panels[row, column]
+            for rule, predicted in found.items():
+                if rule in SOILS and name == "load":
+                    continue
+                values = np.array(predicted["force"])[own, row]
+                each = rmse(predicted).values()
+                numbers = " / ".join(f"{v:.1f}" for v in list(each)[: 2 if rule in SOILS else 3])
+                line = "--" if rule in SOILS else "-"
+                label = f"{rule}{', load given' if rule in SOILS else ''}: {numbers} N"
+                points = [slip[group].mean() for group in groups], [values[group].mean() for group in groups]
+                axis.plot(*points, line, color=colours[rule], linewidth=1.4, label=label)
+            axis.plot(slip, np.array(some["measured"])[own, row], "k.", label="measured")
+            axis.grid(alpha=0.3)
+            if column == 0:
+                axis.set_ylabel(f"{name} [N]")
+        panels[0, column].set_title(f"slip angle {angle:g}°", fontsize=10)
+        panels[2, column].set_xlabel("slip [-]")
+    figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
+    figure.suptitle("Grousered wheel in sand, nothing fitted to it; RMSE of drawbar / side force / load")

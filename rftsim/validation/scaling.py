@@ -1,0 +1,129 @@
+"""The scaling law of driven wheels, [Slonaker2017]: whole simulations of wheel and runner at other scales.
+
+g -> q g, lengths -> r, masses -> s, width -> s r^-2 of itself, omega -> (q / r)^1/2 give V -> (q r)^1/2 V and
+P -> q^3/2 r^1/2 s P; in 3D, where the sides count, s = r^3.
+"""
+
+import dataclasses
+import functools
+from collections.abc import Callable
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from rftsim_models.wheels import FOUR_FLAP_RUNNER, GROUSER_WHEEL, SERVO, WHEEL, WheelParameters, build_wheel
+
+from rftsim.run import STEADY, run
+from rftsim.scene import add_sand
+from rftsim.scenes import POPPY, Staged
+from rftsim.scenes import Measured as MeasuredBy
+from rftsim.surface import Wheel
+from rftsim.validation.study import Measured, Request, Row, at_most
+
+TIMESTEP: Final = 5e-4
+TURNS: Final = 4.0
+NAMES: Final = ("speed", "sinkage", "power")
+LIMIT: Final = 0.1
+"""[%]."""
+
+
+class Scale(NamedTuple):
+    """Factors on gravity, lengths and masses."""
+
+    q: float
+    r: float
+    s: float
+
+
+class Case(NamedTuple):
+    """A wheel that is scaled."""
+
+    wheel: WheelParameters
+    rpm: float
+    law: str
+    lambda_: float
+    structural: bool
+
+
+CASES: Final = {
+    "wheel, rft2d": Case(GROUSER_WHEEL, 60.0, "rft2d", 1.0, True),
+    "wheel, drft2d": Case(GROUSER_WHEEL, 60.0, "drft2d", 1.0, True),
+    "wheel, drft3d": Case(GROUSER_WHEEL, 60.0, "drft3d", 1.0, True),
+    "runner, drft2d": Case(FOUR_FLAP_RUNNER, 150.0, "drft2d", 4.0, False),
+}
+ONE: Final = Scale(1.0, 1.0, 1.0)
+SCALES: Final = {
+    "on the Moon": Scale(0.165, 1.0, 1.0),
+    "half size": Scale(1.0, 0.5, 0.125),
+    "thrice as large on Mars": Scale(0.38, 3.0, 27.0),
+}
+
+
+def jobs(request: Request) -> dict[str, Callable[[], Any]]:
+    """Every case at every scale."""
+    chosen = [("", ONE), *SCALES.items()][:: 3 if request.quick else 1]
+    return {
+        f"{case}/{scale}": functools.partial(simulate, CASES[case], factors)
+        for case in CASES
+        for scale, factors in chosen
+    }
+
+
+def simulate(case: Case, scale: Scale) -> dict[str, float]:
+    """Steady speed, sinkage and power of a case at a scale, and what the scaling law divides them by."""
+    q, r, s = scale
+    base = case.wheel
+    wheel = dataclasses.replace(
+        base,
+        **{name: r * getattr(base, name) for name in ("radius", "lug_height", "lug_width")},
+        width=s / r**2 * base.width,
+        **{name: s * getattr(base, name) for name in ("vertical_mass", "horizontal_mass")},
+        forward_force=q * s * base.forward_force,
+        gravity=q * base.gravity,
+    )
+    time = float(np.sqrt(r / q))
+    spec = build_wheel(wheel, case.rpm / time, gain=SERVO * q * s * r * time)
+    spec.option.timestep = TIMESTEP * time
+    sand = POPPY.replace(g=q * POPPY.g, lambda_=case.lambda_)
+    wheels = {WHEEL: Wheel((0, 1, 0), (0, 0, 0), wheel.outer_radius)} if case.structural else {}
+    bed = add_sand(spec, sand, case.law, max_edge=2 * wheel.width, wheels=wheels)
+    duration = TURNS * 60.0 / case.rpm / STEADY * time
+    done = run(Staged(spec.compile(), bed, MeasuredBy(WHEEL, wheel.outer_radius), duration))
+    last = slice(int(len(done.history.time) * (1 - STEADY)), None)
+    return {
+        "speed": done.steady.speed / np.sqrt(q * r),
+        "sinkage": done.steady.sinkage / r,
+        "power": float(done.history.power[last].mean()) / (q**1.5 * r**0.5 * s),
+    }
+
+
+def rows(measured: Measured) -> list[Row]:
+    """Largest deviation from the scaling law of each case."""
+    source = "exact, [Slonaker2017]"
+    found = []
+    for case in CASES:
+        off = max(max(_deviations(measured, case, name).values()) for name in NAMES)
+        found.append(at_most(f"{case}: speed, sinkage, power, largest deviation", off, LIMIT, source, unit="%"))
+    return found
+
+
+def _deviations(measured: Measured, case: str, name: str) -> dict[str, float]:
+    """From the unscaled case, by scale [%]."""
+    base = measured[f"{case}/"][name]
+    names = [scale for scale in SCALES if f"{case}/{scale}" in measured]
+    return {scale: 100.0 * abs(measured[f"{case}/{scale}"][name] / base - 1.0) for scale in names}
+
+
+def draw(measured: Measured, figure: Any) -> None:
+    """Deviation of each case and scale, against the limit."""
+    panels = figure.subplots(1, 3, sharey=True)
+    for axis, name in zip(panels, NAMES, strict=True):
+        for k, case in enumerate(CASES):
+            off = _deviations(measured, case, name)
+            places = np.arange(len(off)) + 0.15 * (k - 1.5)
+            axis.semilogy(places, np.maximum(list(off.values()), 1e-9), "o", color=f"C{k}", label=case)
+        axis.axhline(LIMIT, color="r", linestyle="--", label="limit")
+        axis.set_xticks(range(len(off)), [label.replace(" on Mars", "\non Mars") for label in off])
+        axis.set_title(name)
+        axis.grid(alpha=0.3)
+    panels[0].set_ylabel("deviation from the scaling law [%]")
+    panels[0].legend(fontsize=8, loc="lower right")

@@ -1,0 +1,106 @@
+"""The grousered wheel of [Agarwal] chapter 4 and its half-size twin: speed and sinkage over the imposed rate."""
+
+import functools
+import math
+from collections.abc import Callable
+from typing import Any, Final
+
+from rftsim.demo import measure
+from rftsim.validation import terramechanics
+from rftsim.validation.study import Measured, Request, Row, at_least, at_most, near
+
+WHEELS: Final = ("grouser-wheel", "half-grouser-wheel")
+LAWS: Final = ("rft2d", "drft2d")
+RATES: Final = (2.0, 5.0, 10.0, 20.0, 30.0, 45.0, 60.0, 75.0, 90.0)
+QUICK_RATES: Final = (10.0, 30.0, 90.0)
+TWIN: Final = 90.0 / math.sqrt(2.0)
+"""Rate of the wheel at which it must do as its half-size twin does at 90: r omega^2 / g is then the same [1/min]."""
+
+
+def jobs(request: Request) -> dict[str, Callable[[], Any]]:
+    """Every wheel, law and rate."""
+    rates = QUICK_RATES if request.quick else RATES
+    found: dict[str, Callable[[], Any]] = {
+        f"{scene}/{law}/{rpm:g}": functools.partial(_point, scene, law, rpm)
+        for scene in WHEELS
+        for law in LAWS
+        for rpm in (*rates, *([TWIN] if (scene, law) == ("grouser-wheel", "drft2d") else []))
+    }
+    return found | {"terramechanics": terramechanics.free_wheel}
+
+
+def _point(scene: str, law: str, rpm: float) -> dict[str, Any]:
+    return measure(scene, law, rpm)._asdict()
+
+
+def _curve(measured: Measured, scene: str, law: str) -> list[dict[str, Any]]:
+    own = [p for p in measured.values() if p.get("scene") == scene and p["law"] == law]
+    return sorted(own, key=lambda point: float(point["rpm"]))
+
+
+def _rolling(points: list[dict[str, Any]]) -> list[float]:
+    """The ratio v / (R omega)."""
+    return [1.0 - point["slip"] for point in points]
+
+
+def _spread(values: list[float]) -> float:
+    return (max(values) - min(values)) / (sum(values) / len(values))
+
+
+def rows(measured: Measured) -> list[Row]:
+    """Published trends, an independent program's numbers, and the exact ones of appendix B."""
+    static, dynamic = (_curve(measured, "grouser-wheel", law) for law in LAWS)
+    half_static, half = (_curve(measured, "half-grouser-wheel", law) for law in LAWS)
+    at = {f"{point['rpm']:g}": point for point in dynamic}
+    ratio = dict(zip(at, _rolling(dynamic), strict=True))
+    sunk = {rpm: point["sinkage"] for rpm, point in at.items()}
+    fall = (ratio["10"] - ratio["30"]) / (ratio["30"] - ratio["90"])
+    program, exact = "independent planar program", "[Agarwal] B.2: no speed in the law"
+    trend, twin = "[Agarwal] Fig. 4-7", "[Agarwal] B.1: delta h = r (r ω²/g)"
+    mean = sum(_rolling(static)) / len(static)
+    plain = measured["terramechanics"]
+    names = [f"{point['rpm']:g}" for point in static]
+    span = f"{names[0]} to {names[-1]} RPM"
+    return [
+        near("RFT: v/(Rω), mean", mean, 0.85, 0.01, program),
+        at_most(f"RFT: spread of v/(Rω), {span}", 100 * _spread(_rolling(static)), 0.5, exact, unit="%"),
+        at_most("RFT: the same with the half-size wheel", 100 * _spread(_rolling(half_static)), 0.5, exact, unit="%"),
+        near("DRFT: v/(Rω) at 10 RPM", ratio["10"], 0.85, 0.01, program),
+        near("DRFT: v/(Rω) at 90 RPM", ratio["90"], 0.77, 0.01, program),
+        at_most(
+            "DRFT: fall of v/(Rω) from 10 to 30 over that from 30 to 90 RPM", fall, 1.0, f"{trend}: v ∝ ω below 30"
+        ),
+        at_least("DRFT: sinkage at 90 over at 30 RPM", sunk["90"] / sunk["30"], 1.0, f"{trend}: it rises"),
+        near("DRFT: v/(Rω) of the half-size wheel at 90 RPM", _rolling(half)[-1], ratio[f"{TWIN:g}"], 1e-3, twin),
+        near("DRFT: its sinkage/ℓ", half[-1]["sinkage"], sunk[f"{TWIN:g}"], 2e-4, twin),
+        Row(
+            "terramechanics: v/(Rω)", plain["rolling"], terramechanics.POPPY_SOURCE, note="smooth wheel; no rate in it"
+        ),
+        Row("terramechanics: sinkage/ℓ", plain["sinkage"], terramechanics.POPPY_SOURCE),
+    ]
+
+
+def draw(measured: Measured, figure: Any) -> None:
+    """Speed and sinkage over spin, dimensionless as in [Agarwal] Fig. 4-7."""
+    left, right = figure.subplots(1, 2)
+    for scene, colour in zip(WHEELS, ("C0", "0.2"), strict=True):
+        for law, line in zip(LAWS, ("--", "-"), strict=True):
+            points = _curve(measured, scene, law)
+            spin = [point["spin"] for point in points]
+            size = "half size, " if scene != WHEELS[0] else ""
+            style = {"color": colour, "linestyle": line, "marker": "ox"[size != ""], "markersize": 5}
+            left.plot(spin, _rolling(points), **style, label=f"{size}{law}")
+            right.plot(spin, [point["sinkage"] for point in points], **style, label=f"{size}{law}")
+    spins = {f"{point['rpm']:g}": point["spin"] for point in _curve(measured, WHEELS[0], "drft2d")}
+    left.plot([spins["10"], spins["90"]], [0.85, 0.77], "r*", markersize=11, label="independent program, drft2d")
+    left.axhline(measured["terramechanics"]["rolling"], color="C2", linestyle=":", label="terramechanics, smooth wheel")
+    right.axhline(
+        measured["terramechanics"]["sinkage"], color="C2", linestyle=":", label="terramechanics, smooth wheel"
+    )
+    left.set_ylabel("rolling  $v/(R\\omega)$ [-]")
+    right.set_ylabel("sinkage  $z/\\ell$ [-]")
+    for axis in (left, right):
+        axis.set_xlabel("spin  $\\omega/\\sqrt{g/\\ell}$ [-]")
+        axis.grid(alpha=0.3)
+        axis.legend(fontsize=8)
+    figure.suptitle("Grousered wheel on loose poppy seeds, [Agarwal] Table 4.1")
