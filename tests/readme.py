@@ -9,7 +9,12 @@ from pathlib import Path
 
 README = Path(__file__).parent.parent / "README.md"
 NEEDS_FILES = re.compile(r"robot\.xml|mesh\.stl|out/train")
-SHORTENED = {"train": "--steps 2048", "evaluate": "--episodes 1 --on sand", "play": "--seconds 0.2"}
+SHORTENED = {
+    "train": "--steps 2048",
+    "evaluate": "--episodes 1 --on sand",
+    "play": "--seconds 0.2",
+    "validate": "plates",
+}
 """What makes a command short."""
 
 

@@ -90,7 +90,7 @@ class Validate:
 
 
 def _number(value: float) -> str:
-    return f"{value:.4g}"
+    return "0" if abs(value) < 1e-9 else f"{value:.4g}"
 
 
 def _wanted(row: Row) -> str:
@@ -106,7 +106,7 @@ def _cells(row: Row) -> list[str]:
     """Quantity, expected, got, error, verdict, source."""
     what = row.what + (f" [{row.unit}]" if row.unit != "-" else "")
     got = "-" if row.got is None else _number(row.got)
-    error = "-" if row.error is None else f"{100 * row.error:+.2f} %"
+    error = "-" if row.error is None else f"{round(100 * row.error, 2) + 0.0:+.2f} %"
     return [what, _wanted(row), got, error, MARKS[row.passed], row.source + (f"; {row.note}" if row.note else "")]
 
 

@@ -118,7 +118,7 @@ def rows(measured: Measured) -> list[Row]:
     published, own = "[Agarwal] section 4.7", "what the law was given: exact"
     for depth, force in zip(DRAG_DEPTHS, dragged["force"], strict=True):
         what = f"drag at {1e3 * depth:g} mm, slow"
-        found.append(near(what, force[0], DRAG_FORCES[depth], 0.05, published, unit="N/m"))
+        found.append(near(what, force[0], DRAG_FORCES[depth], 0.05, published, unit="N/m", note="ζ is that of K"))
     added = dragged["force"][0][-1] - dragged["force"][0][0]
     worst = max(oblique["inertia"], key=lambda value: abs(float(value) - OBLIQUE_SAND.lambda_))
     return [

@@ -56,7 +56,7 @@ def rows(measured: Measured) -> list[Row]:
     sunk = {rpm: point["sinkage"] for rpm, point in at.items()}
     fall = (ratio["10"] - ratio["30"]) / (ratio["30"] - ratio["90"])
     program, exact = "independent planar program", "[Agarwal] B.2: no speed in the law"
-    trend, twin = "[Agarwal] Fig. 4-7", "[Agarwal] B.1: delta h = r (r ω²/g)"
+    trend, twin = "[Agarwal] Fig. 4-7", "[Agarwal] B.1: δh = r (r ω²/g)"
     mean = sum(_rolling(static)) / len(static)
     plain = measured["terramechanics"]
     names = [f"{point['rpm']:g}" for point in static]
@@ -73,9 +73,7 @@ def rows(measured: Measured) -> list[Row]:
         at_least("DRFT: sinkage at 90 over at 30 RPM", sunk["90"] / sunk["30"], 1.0, f"{trend}: it rises"),
         near("DRFT: v/(Rω) of the half-size wheel at 90 RPM", _rolling(half)[-1], ratio[f"{TWIN:g}"], 1e-3, twin),
         near("DRFT: its sinkage/ℓ", half[-1]["sinkage"], sunk[f"{TWIN:g}"], 2e-4, twin),
-        Row(
-            "terramechanics: v/(Rω)", plain["rolling"], terramechanics.POPPY_SOURCE, note="smooth wheel; no rate in it"
-        ),
+        Row("terramechanics: v/(Rω)", plain["rolling"], terramechanics.POPPY_SOURCE, note="smooth"),
         Row("terramechanics: sinkage/ℓ", plain["sinkage"], terramechanics.POPPY_SOURCE),
     ]
 

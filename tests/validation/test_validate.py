@@ -1,0 +1,141 @@
+"""`rftsim validate` as a person uses it: verdicts, exit codes, what is remembered, and errors before anything runs."""
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rftsim.cli import main
+from rftsim.kept import Kept
+from rftsim.validation import measured, plates
+from rftsim.validation.study import Row, at_least, at_most, near
+
+README = Path(__file__).parents[2] / "README.md"
+
+
+def call(capsys, *arguments):
+    """Exit code, standard output and standard error of one command."""
+    code = 0
+    try:
+        main(["validate", *map(str, arguments)])
+    except SystemExit as end:
+        code = end.code
+    captured = capsys.readouterr()
+    return code, captured.out, captured.err
+
+
+@pytest.mark.parametrize(
+    ("row", "passed", "error"),
+    [
+        (near("x", 1.01, 1.0, 0.02, "s"), True, 0.01),
+        (near("x", 0.9, 1.0, 0.02, "s"), False, -0.1),
+        (at_most("x", 2.0, 1.0, "s"), False, None),
+        (at_least("x", 2.0, 1.0, "s"), True, None),
+        (at_least("x", math.nan, 1.0, "s"), False, None),
+        (Row("x", 2.0, "s"), None, None),
+        (Row("x", None, "s", high=1.0), None, None),
+    ],
+)
+def test_verdicts(row, passed, error):
+    assert row.passed is passed
+    assert row.error == (None if error is None else pytest.approx(error))
+
+
+def test_what_was_measured_is_not_measured_again(tmp_path):
+    path = tmp_path / "kept.json"
+    assert Kept(path, b"inputs").get("x", lambda: 1.0) == 1.0
+    assert Kept(path, b"inputs").get("x", lambda: 2.0) == 1.0
+    assert Kept(path, b"other inputs").get("x", lambda: 3.0) == 3.0
+
+
+def test_a_study_prints_draws_and_is_remembered(capsys, tmp_path, monkeypatch):
+    options = ("plates", "--json", "--plot", tmp_path, "--memory", tmp_path / "memory")
+    code, out, _ = call(capsys, *options)
+    assert code == 0
+    rows = json.loads(out)["plates"]
+    assert all(row["passed"] and row["source"] for row in rows)
+    assert (tmp_path / "plates.png").read_bytes().startswith(b"\x89PNG")
+    monkeypatch.setattr(plates, "surface_force", None)
+    assert call(capsys, *options)[1] == out
+
+
+def test_a_study_that_was_stopped_goes_on(capsys, tmp_path, monkeypatch):
+    def stop(angles):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(plates, "oblique", stop)
+        with pytest.raises(KeyboardInterrupt):
+            main(["validate", "plates", "--json", "--memory", str(tmp_path)])
+    capsys.readouterr()
+    monkeypatch.setattr(plates, "drag", stop)
+    assert call(capsys, "plates", "--json", "--memory", tmp_path)[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("wheels",), "no study 'wheels'; studies are wheel, runner"),
+        (("plates", "--data", "no/such/folder"), "no folder no/such/folder"),
+        (("plates", "--json", "--markdown"), "exclude one another"),
+    ],
+)
+def test_refusals_before_anything_runs(capsys, tmp_path, arguments, words):
+    code, out, err = call(capsys, *arguments, "--memory", tmp_path / "memory")
+    assert code == 2
+    assert out == ""
+    assert len(err.strip().splitlines()) == 1
+    assert words in err
+    assert not (tmp_path / "memory").exists()
+
+
+def test_absent_data_are_said_and_do_not_fail(capsys, tmp_path):
+    code, out, _ = call(capsys, "measured", "--data", tmp_path, "--memory", tmp_path / "m", "--plot", tmp_path)
+    assert code == 0
+    assert out.count("data not here") == 2
+    assert (tmp_path / "measured.png").is_file()
+
+
+def test_a_failing_row_is_marked_and_ends_with_1(capsys, tmp_path):
+    """Plates a hundred times stiffer than the sand's density and friction make them."""
+    depth = np.linspace(0.001, 0.03, 30)
+    lines = ["box,trial,plate_diameter_mm,time_s,depth_m,force_N"]
+    for size in (60, 100):
+        force = 1e8 * depth * math.pi / 4 * (size / 1e3) ** 2
+        lines += [f"a,b,{size},0,{z},{f}" for z, f in zip(depth, force, strict=True)]
+    (tmp_path / measured.PLATE_FILE).write_text("\n".join(lines))
+    options = ("measured", "--data", tmp_path, "--memory", tmp_path / "m")
+    code, out, _ = call(capsys, *options)
+    assert code == 1
+    assert "FAIL measured: plate of 60 mm" in out
+    code, out, _ = call(capsys, *options, "--markdown")
+    assert code == 1
+    assert out.count("**FAIL**") == 2
+    assert out.rstrip().endswith("rftsim validate measured --markdown")
+
+
+def test_a_file_without_its_columns(capsys, tmp_path):
+    (tmp_path / measured.WHEEL_FILE).write_text("slip_ratio\n0.1\n")
+    code, _, err = call(capsys, "measured", "--data", tmp_path, "--memory", tmp_path / "m")
+    assert code == 2
+    assert "has no column slip_angle_deg" in err
+
+
+def test_readme_has_the_table_that_is_printed(capsys, tmp_path):
+    """The rows of the studies that take no time; the first cell has the study's name in its first row only."""
+    code, out, _ = call(capsys, "plates", "drill", "--markdown", "--memory", tmp_path)
+    rows = [line for line in out.splitlines() if line.startswith("| ")][2:]
+    assert code == 0
+    assert len(rows) > 10
+    assert set(rows) <= set(README.read_text().splitlines())
+
+
+@pytest.mark.slow
+def test_everything_quick_passes(capsys, tmp_path):
+    """Every row that needs no data, in under five minutes on two cores."""
+    code, out, _ = call(capsys, "--quick", "--json", "--data", tmp_path, "--memory", tmp_path / "m")
+    failed = [row for rows in json.loads(out).values() for row in rows if row["passed"] is False]
+    assert failed == []
+    assert code == 0
