@@ -28,7 +28,7 @@ STUDIES: Final = {
 """Every study by name."""
 
 
-SHARED: Final = ("terramechanics", "pockets")
+SHARED: Final = ("balance", "pockets", "terramechanics")
 """Modules that studies compute with."""
 
 

@@ -9,6 +9,7 @@ from scipy.optimize import brentq
 
 from rftsim.sand import PRESETS
 from rftsim.surface import Array
+from rftsim.validation.balance import steady
 
 
 class Soil(NamedTuple):
@@ -114,15 +115,9 @@ def sinkage_under(
 
 def free_wheel() -> dict[str, Any]:
     """Steady rolling v / (R omega) and sinkage / l of the wheel of [Agarwal] Table 4.1 on loose poppy seeds."""
-    wheel = GROUSER_WHEEL
-    radius, weight = wheel.outer_radius, wheel.vertical_mass * wheel.gravity
 
-    def sunk(rolling: float) -> float:
-        return sinkage_under(POPPY, weight, radius, wheel.width, 1.0, (rolling, 0.0))
+    def force(rolling: float, sinkage: float) -> tuple[float, float]:
+        found = wheel_force(POPPY, GROUSER_WHEEL.outer_radius, GROUSER_WHEEL.width, sinkage, 1.0, (rolling, 0.0))
+        return found.drawbar, found.load
 
-    def pull(rolling: float) -> float:
-        force = wheel_force(POPPY, radius, wheel.width, sunk(rolling), 1.0, (rolling, 0.0))
-        return force.drawbar + wheel.forward_force
-
-    rolling = float(brentq(pull, 0.02, 0.999))
-    return {"rolling": rolling, "sinkage": sunk(rolling) / (2 * radius)}
+    return {**steady(GROUSER_WHEEL, force)}

@@ -5,14 +5,19 @@ import math
 from collections.abc import Callable
 from typing import Any, Final
 
+from rftsim_models.wheels import GROUSER_WHEEL
+
 from rftsim.demo import measure
-from rftsim.validation import terramechanics
+from rftsim.scenes import POPPY
+from rftsim.validation import balance, terramechanics
 from rftsim.validation.study import Measured, Request, Row, at_least, at_most, near
 
 WHEELS: Final = ("grouser-wheel", "half-grouser-wheel")
 LAWS: Final = ("rft2d", "drft2d")
 RATES: Final = (2.0, 5.0, 10.0, 20.0, 30.0, 45.0, 60.0, 75.0, 90.0)
 QUICK_RATES: Final = (10.0, 30.0, 90.0)
+RULES: Final = {"one third": 1.0 / 3.0, "full grousers": 1.0, "least power": None}
+"""Shares of their height that grousers keep."""
 TWIN: Final = 90.0 / math.sqrt(2.0)
 """Rate of the wheel at which it must do as its half-size twin does at 90: r omega^2 / g is then the same [1/min]."""
 
@@ -26,6 +31,8 @@ def jobs(request: Request) -> dict[str, Callable[[], Any]]:
         for law in LAWS
         for rpm in (*rates, *([TWIN] if (scene, law) == ("grouser-wheel", "drft2d") else []))
     }
+    for rule, share in RULES.items():
+        found[f"static/{rule}"] = functools.partial(balance.grousered, GROUSER_WHEEL, POPPY, rule, share)
     return found | {"terramechanics": terramechanics.free_wheel}
 
 
@@ -59,6 +66,7 @@ def rows(measured: Measured) -> list[Row]:
     trend, twin = "[Agarwal] Fig. 4-7", "[Agarwal] B.1: δh = r (r ω²/g)"
     mean = sum(_rolling(static)) / len(static)
     plain = measured["terramechanics"]
+    third, full, least = (measured[f"static/{rule}"] for rule in RULES)
     names = [f"{point['rpm']:g}" for point in static]
     span = f"{names[0]} to {names[-1]} RPM"
     return [
@@ -73,6 +81,9 @@ def rows(measured: Measured) -> list[Row]:
         at_least("DRFT: sinkage at 90 over at 30 RPM", sunk["90"] / sunk["30"], 1.0, f"{trend}: it rises"),
         near("DRFT: v/(Rω) of the half-size wheel at 90 RPM", _rolling(half)[-1], ratio[f"{TWIN:g}"], 1e-3, twin),
         near("DRFT: its sinkage/ℓ", half[-1]["sinkage"], sunk[f"{TWIN:g}"], 2e-4, twin),
+        near("RFT: v/(Rω) by static balance, one third", third["rolling"], mean, 0.002, "our simulation, its mean"),
+        Row("the same, full grousers", full["rolling"], "no shadow"),
+        Row("the same, least power", least["rolling"], "see README; nothing fitted"),
         Row("terramechanics: v/(Rω)", plain["rolling"], terramechanics.POPPY_SOURCE, note="smooth"),
         Row("terramechanics: sinkage/ℓ", plain["sinkage"], terramechanics.POPPY_SOURCE),
     ]

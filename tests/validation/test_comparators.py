@@ -15,7 +15,7 @@ SMOOTH = Soil(k_c=0.0, k_phi=1e6, exponent=1.0, friction=0.0, shear=0.02, c1=0.0
 
 
 def test_frictionless_wheel_is_a_sunken_segment():
-    """With p = k z, no shear, the peak at the bottom: the load is k b half a segment's area, the drawbar -k b z² / 2."""
+    """With p = k z, no shear, the peak at the bottom: load is k b half a segment's area, drawbar -k b z² / 2."""
     force = wheel_force(SMOOTH, R, B, Z, 0.1, (0.1, 0.0))
     entry = math.acos(1 - Z / R)
     assert force.load == pytest.approx(1e6 * B * R**2 * (entry - math.sin(entry) * math.cos(entry)) / 2, rel=1e-4)
