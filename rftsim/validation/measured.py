@@ -5,27 +5,21 @@ load; and circular plates pushed into the same sand. Strength and friction of th
 friction angle alone; nothing is fitted to the wheel.
 """
 
-import csv
 import functools
-import hashlib
 import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 
-from rftsim.errors import RftsimError
 from rftsim.sand import ALPHA_Z_PLATE, Sand, xi_n_cubic
-from rftsim.surface import Array
 from rftsim.validation import pockets, terramechanics
+from rftsim.validation.cmu import PLATE_FILE, SMOOTH_FILE, WHEEL_FILE, Runs, digest, read_plates, read_runs
 from rftsim.validation.pockets import Grousers, Motion, Shaded
 from rftsim.validation.study import Measured, Request, Row, at_least, at_most, near
 from rftsim.validation.terramechanics import Soil
 
-WHEEL_FILE, PLATE_FILE = "cmu_wheel_grouser.csv", "cmu_circular_plate_sinkage.csv"
-SMOOTH_FILE: Final = "cmu_wheel_smooth.csv"
-"""A smooth wheel in the same sand, of the same columns; not among the data that come with the grousered one."""
 WHEEL: Final = Grousers(hub=0.0575, tip=0.0625, width=0.060, number=24, thickness=0.002)
 """The thickness of the grousers is not published; 1 to 3 mm change an RMSE by less than 0.2 N."""
 SAND: Final = Sand(rho_c=1330.0, mu_int=math.tan(math.radians(29)), mu_surf=0.35)
@@ -53,80 +47,25 @@ DATA: Final = Path("../shared/data/cmu")
 """Where the data are looked for."""
 
 
-class Runs(NamedTuple):
-    """Measured runs of a wheel, (n,) each; SI."""
-
-    slip: Array
-    angle: Array
-    """Slip angle [rad]."""
-    travel: Array
-    """[m/s]."""
-    rim: Array
-    """[m/s]."""
-    sinkage: Array
-    """Of the tips [m]."""
-    force: Array
-    """Drawbar, side and load [N], (n, 3)."""
-
-    def velocity(self, run: int) -> tuple[float, float]:
-        """Of the axle along and across the wheel's heading [m/s]."""
-        travel, angle = float(self.travel[run]), float(self.angle[run])
-        return travel * math.cos(angle), travel * math.sin(angle)
-
-    @property
-    def judged(self) -> Any:
-        """Runs that are compared: moderate slips and slip angles."""
-        return (np.abs(self.slip) <= MOST_SLIP) & (self.angle <= math.radians(MOST_ANGLE_DEG + 1e-6))
-
-
-def _columns(path: Path) -> dict[str, list[str]]:
-    with path.open(newline="") as file:
-        lines = list(csv.DictReader(file))
-    if not lines:
-        raise RftsimError(f"{path} has no rows")
-    return {name: [line[name] for line in lines] for name in lines[0]}
-
-
-def read_runs(path: Path) -> Runs:
-    """The runs in a wheel's file.
-
-    Raises:
-        RftsimError: The file lacks a column, or a number.
-    """
-    columns = _columns(path)
-    names = ("slip_ratio", "slip_angle_deg", "travel_speed_mm_s", "rim_speed_mm_s", "sinkage_mm")
-    forces = ("F_drawbar_N", "F_sidewall_N", "F_load_N")
-    for name in (*names, *forces):
-        if name not in columns:
-            raise RftsimError(f"{path} has no column {name}")
-    try:
-        slip, angle, travel, rim, sinkage, *force = (np.array(columns[n], dtype=float) for n in (*names, *forces))
-    except ValueError as error:
-        raise RftsimError(f"{path}: {error}") from error
-    return Runs(slip, np.radians(angle), travel / 1e3, rim / 1e3, sinkage / 1e3, np.column_stack(force))
-
-
 def jobs(request: Request) -> dict[str, Callable[[], Any]]:
     """Every rule on every run, and the plates; what has no data says so."""
     found: dict[str, Callable[[], Any]] = {}
     wheel, plates = request.data / WHEEL_FILE, request.data / PLATE_FILE
     if wheel.is_file():
-        mark = _digest(wheel)
+        mark = digest(wheel)
         for rule in (*SHARES, LEAST):
             found[f"wheel {mark}/{rule}"] = functools.partial(by_force_law, rule, wheel)
-        soils = {LITERATURE: terramechanics.DRY_SAND} | ({OWN: soil_of_plates(plates)} if plates.is_file() else {})
-        for name, soil in soils.items():
-            found[f"wheel {mark}/{name}"] = functools.partial(by_terramechanics, soil, wheel)
+        soils = {LITERATURE: (terramechanics.DRY_SAND, "")}
+        if plates.is_file():
+            soils[OWN] = soil_of_plates(plates), f" {digest(plates)}"
+        for name, (soil, of) in soils.items():
+            found[f"wheel {mark}{of}/{name}"] = functools.partial(by_terramechanics, soil, wheel)
     smooth = request.data / SMOOTH_FILE
     if smooth.is_file():
-        found[f"smooth {_digest(smooth)}/{SMOOTH}"] = functools.partial(by_force_law, SMOOTH, smooth)
+        found[f"smooth {digest(smooth)}/{SMOOTH}"] = functools.partial(by_force_law, SMOOTH, smooth)
     if plates.is_file():
-        found[f"plates {_digest(plates)}"] = functools.partial(plate_stiffness, plates)
+        found[f"plates {digest(plates)}"] = functools.partial(plate_stiffness, plates)
     return found
-
-
-def _digest(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()[:12]
 
 
 def by_force_law(rule: str, wheel: Path) -> dict[str, Any]:
@@ -135,7 +74,7 @@ def by_force_law(rule: str, wheel: Path) -> dict[str, Any]:
     shaded = Shaded(WHEEL)
     solid = WHEEL.disc() if rule == SMOOTH else WHEEL.with_height(SHARES[rule]) if rule in SHARES else None
     found = []
-    for k in np.flatnonzero(runs.judged):
+    for k in np.flatnonzero(_judged(runs)):
         velocity = np.array([*runs.velocity(int(k)), 0.0])
         height, rate = WHEEL.tip - float(runs.sinkage[k]), float(runs.rim[k]) / WHEEL.tip
         total = np.zeros(3)
@@ -153,7 +92,7 @@ def by_terramechanics(soil: Soil, wheel: Path) -> dict[str, Any]:
     """The same by terramechanics, under the measured load, and the sinkage [m]."""
     runs = read_runs(wheel)
     found, sunk = [], []
-    for k in np.flatnonzero(runs.judged):
+    for k in np.flatnonzero(_judged(runs)):
         shape = WHEEL.tip, WHEEL.width
         motion = float(runs.rim[k]), runs.velocity(int(k))
         sinkage = terramechanics.sinkage_under(soil, float(runs.force[k, 2]), *shape, *motion)
@@ -163,8 +102,13 @@ def by_terramechanics(soil: Soil, wheel: Path) -> dict[str, Any]:
     return {"force": found, "sinkage": sunk} | _compared(runs)
 
 
+def _judged(runs: Runs) -> Any:
+    """Runs that are compared: moderate slips and slip angles."""
+    return (np.abs(runs.slip) <= MOST_SLIP) & (runs.angle <= math.radians(MOST_ANGLE_DEG + 1e-6))
+
+
 def _compared(runs: Runs) -> dict[str, Any]:
-    judged = runs.judged
+    judged = _judged(runs)
     return {
         "measured": runs.force[judged].tolist(),
         "measured_sinkage": runs.sinkage[judged].tolist(),
@@ -173,25 +117,13 @@ def _compared(runs: Runs) -> dict[str, Any]:
     }
 
 
-def plate_stiffness(path: Path) -> dict[str, Any]:
-    """Stress over depth of each plate test, through the origin, and Bekker's parameters of all [SI]."""
+def plate_stiffness(path: Path) -> dict[str, list[float]]:
+    """Stress over depth of each plate test, through the origin [N/m^3], by diameter in mm."""
     found: dict[str, list[float]] = {}
-    for diameter, depth, force in _tests(path):
-        area = math.pi / 4 * diameter**2
-        found.setdefault(f"{1e3 * diameter:g}", []).append(float(depth @ force / (depth @ depth)) / area)
-    return {"alpha": found, "soil": list(soil_of_plates(path))}
-
-
-def _tests(path: Path) -> list[tuple[float, Array, Array]]:
-    """Diameter [m], depths [m] and forces [N] of each plate test."""
-    columns = _columns(path)
-    labels = list(zip(columns["box"], columns["trial"], columns["plate_diameter_mm"], strict=True))
-    depth, force = (np.array(columns[name], dtype=float) for name in ("depth_m", "force_N"))
-    tests = []
-    for label in dict.fromkeys(labels):
-        own = np.array([other == label for other in labels])
-        tests.append((float(label[2]) / 1e3, depth[own], force[own]))
-    return tests
+    for test in read_plates(path):
+        slope = float(test.depth @ test.force / (test.depth @ test.depth))
+        found.setdefault(f"{1e3 * test.diameter:g}", []).append(slope / test.area)
+    return found
 
 
 def soil_of_plates(path: Path) -> Soil:
@@ -200,14 +132,13 @@ def soil_of_plates(path: Path) -> Soil:
     ln p = ln(k_c / b + k_phi) + n ln z by least squares, b the plate's radius, less than 5 mm of depth left out.
     """
     rows, right = [], []
-    tests = _tests(path)
-    sizes = sorted({diameter for diameter, _, _ in tests})
-    for diameter, depth, force in tests:
-        deep = (depth > 0.005) & (force > 0.0)
-        pressure = force[deep] / (math.pi / 4 * diameter**2)
-        one_hot = [float(diameter == size) for size in sizes]
-        rows += [[*one_hot, z] for z in np.log(depth[deep])]
-        right += np.log(pressure).tolist()
+    tests = read_plates(path)
+    sizes = sorted({test.diameter for test in tests})
+    for test in tests:
+        deep = (test.depth > 0.005) & (test.force > 0.0)
+        one_hot = [float(test.diameter == size) for size in sizes]
+        rows += [[*one_hot, z] for z in np.log(test.depth[deep])]
+        right += np.log(test.force[deep] / test.area).tolist()
     *logs, exponent = np.linalg.lstsq(np.array(rows), np.array(right), rcond=None)[0]
     radii = np.array(sizes) / 2
     k_c, k_phi = np.polyfit(1.0 / radii, np.exp(logs), 1)
@@ -225,7 +156,7 @@ def _by_rule(measured: Measured, wheel: str = "wheel") -> dict[str, dict[str, An
     return {name.partition("/")[2]: value for name, value in measured.items() if name.startswith(f"{wheel} ")}
 
 
-def _plates(measured: Measured) -> dict[str, Any] | None:
+def _plates(measured: Measured) -> dict[str, list[float]] | None:
     return next((value for name, value in measured.items() if name.startswith("plates ")), None)
 
 
@@ -278,13 +209,13 @@ def _wheel_rows(found: dict[str, dict[str, Any]]) -> list[Row]:
     return rows
 
 
-def _plate_rows(found: dict[str, Any] | None) -> list[Row]:
+def _plate_rows(found: dict[str, list[float]] | None) -> list[Row]:
     if found is None:
         return [Row("circular plates", None, f"{ABSENT}; --data DIR with {PLATE_FILE}")]
     predicted = 1e-6 * ALPHA_Z_PLATE * float(SAND.xi_n or math.nan)
     reason = "near the surface sand stiffens with the plate's size, which RFT cannot show"
     rows = []
-    for diameter, values in sorted(found["alpha"].items(), key=lambda item: float(item[0])):
+    for diameter, values in sorted(found.items(), key=lambda item: float(item[0])):
         mean = 1e-6 * float(np.mean(values))
         note = reason if abs(predicted - mean) > 0.15 * mean else ""
         what = f"plate of {diameter} mm: α_z"

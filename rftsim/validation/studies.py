@@ -28,7 +28,7 @@ STUDIES: Final = {
 """Every study by name."""
 
 
-SHARED: Final = ("balance", "pockets", "terramechanics")
+SHARED: Final = ("balance", "cmu", "pockets", "terramechanics")
 """Modules that studies compute with."""
 
 

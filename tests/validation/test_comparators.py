@@ -1,12 +1,16 @@
 """What the studies compute besides the force laws: terramechanics and curvature, against closed forms."""
 
+import dataclasses
 import math
 
 import numpy as np
 import pytest
 import trimesh
+from rftsim_models.wheels import GROUSER_WHEEL
 
-from rftsim import make_surface
+from rftsim import RftsimError, make_surface
+from rftsim.scenes import POPPY
+from rftsim.validation.balance import grousered
 from rftsim.validation.drill import RADIUS, curvature_radius, upright
 from rftsim.validation.terramechanics import Soil, sinkage_under, wheel_force
 
@@ -37,6 +41,19 @@ def test_shear_never_exceeds_the_friction():
     aside = wheel_force(soil, R, B, Z, 0.1, (0.1, 0.05))
     assert aside.side < 0.0
     assert wheel_force(soil, R, B, Z, 0.1, (0.1, -0.05)).side == pytest.approx(-aside.side)
+
+
+def test_the_wheel_by_static_balance():
+    """[Agarwal] Table 4.1: 0.85 by an independent planar program, without simulating anything."""
+    found = grousered(GROUSER_WHEEL, POPPY, "one third", 1 / 3)
+    assert found["rolling"] == pytest.approx(0.85, abs=0.005)
+    assert found["sinkage"] == pytest.approx(0.189, abs=0.002)
+
+
+def test_no_balance_under_a_push_that_is_too_large():
+    heavy = dataclasses.replace(GROUSER_WHEEL, forward_force=-1e3)
+    with pytest.raises(RftsimError, match="no steady state"):
+        grousered(heavy, POPPY, "one third", 1 / 3)
 
 
 def test_curvature_of_a_sphere():

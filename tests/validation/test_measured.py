@@ -8,6 +8,7 @@ import pytest
 from rftsim import surface_force
 from rftsim.sand import Sand
 from rftsim.validation import measured, pockets
+from rftsim.validation.cmu import WHEEL_FILE
 from rftsim.validation.pockets import Grousers, Motion, Shaded
 
 DATA = Path(__file__).parents[3] / "shared/data/cmu"
@@ -19,7 +20,7 @@ MOTION = Motion(0.045, 0.1, np.array([0.008, 0.004, 0.0]), 0.25)
 @pytest.mark.skipif(not DATA.is_dir(), reason="the measured data are not here")
 def test_one_third_of_the_grousers_halves_the_error():
     """RMSE of the drawbar, nothing fitted: at least twice better with a third; side within 4 N, load within 6.5 N."""
-    found = {rule: measured.rmse(measured.by_force_law(rule, DATA / measured.WHEEL_FILE)) for rule in measured.SHARES}
+    found = {rule: measured.rmse(measured.by_force_law(rule, DATA / WHEEL_FILE)) for rule in measured.SHARES}
     third = found["one third"]
     assert found["full grousers"]["drawbar"] > 2.0 * third["drawbar"]
     assert third["side"] < 4.0
@@ -29,7 +30,7 @@ def test_one_third_of_the_grousers_halves_the_error():
 @pytest.mark.skipif(not DATA.is_dir(), reason="the measured data are not here")
 def test_pockets_that_take_the_cheaper_way_do_as_well():
     """Least power per pocket, no third: drawbar more than twice better than with full grousers (6.6 N), side 4 N."""
-    found = measured.rmse(measured.by_force_law(measured.LEAST, DATA / measured.WHEEL_FILE))
+    found = measured.rmse(measured.by_force_law(measured.LEAST, DATA / WHEEL_FILE))
     assert found["drawbar"] < 6.5 / 2.0
     assert found["side"] < 4.0
 

@@ -9,7 +9,8 @@ import pytest
 
 from rftsim.cli import main
 from rftsim.kept import Kept
-from rftsim.validation import measured, plates
+from rftsim.validation import plates
+from rftsim.validation.cmu import PLATE_FILE, WHEEL_FILE
 from rftsim.validation.study import Row, at_least, at_most, near
 
 README = Path(__file__).parents[2] / "README.md"
@@ -105,7 +106,7 @@ def test_a_failing_row_is_marked_and_ends_with_1(capsys, tmp_path):
     for size in (60, 100):
         force = 1e8 * depth * math.pi / 4 * (size / 1e3) ** 2
         lines += [f"a,b,{size},0,{z},{f}" for z, f in zip(depth, force, strict=True)]
-    (tmp_path / measured.PLATE_FILE).write_text("\n".join(lines))
+    (tmp_path / PLATE_FILE).write_text("\n".join(lines))
     options = ("measured", "--data", tmp_path, "--memory", tmp_path / "m")
     code, out, _ = call(capsys, *options)
     assert code == 1
@@ -116,11 +117,20 @@ def test_a_failing_row_is_marked_and_ends_with_1(capsys, tmp_path):
     assert out.rstrip().endswith("rftsim validate measured --markdown")
 
 
-def test_a_file_without_its_columns(capsys, tmp_path):
-    (tmp_path / measured.WHEEL_FILE).write_text("slip_ratio\n0.1\n")
+@pytest.mark.parametrize(
+    ("name", "text", "words"),
+    [
+        (WHEEL_FILE, "slip_ratio\n0.1\n", "has no column slip_angle_deg"),
+        (WHEEL_FILE, "slip_ratio\n", "has no rows"),
+        (PLATE_FILE, "box,trial,plate_diameter_mm,depth_m,force_N\na,b,60,0.01,much\n", "is no number"),
+        (PLATE_FILE, "box,trial,plate_diameter_mm,depth_m,force_N\na,b,60,0.01,10\n", "plates of one size"),
+    ],
+)
+def test_damaged_data(capsys, tmp_path, name, text, words):
+    (tmp_path / name).write_text(text)
     code, _, err = call(capsys, "measured", "--data", tmp_path, "--memory", tmp_path / "m")
     assert code == 2
-    assert "has no column slip_angle_deg" in err
+    assert words in " ".join(err.split())
 
 
 def test_readme_has_the_table_that_is_printed(capsys, tmp_path):

@@ -1,0 +1,104 @@
+"""Reading the measurements of Pavlov and Johnson, CMU "3d-terramechanics" (MIT licence): a wheel, and plates."""
+
+import csv
+import hashlib
+import math
+from pathlib import Path
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from rftsim.errors import RftsimError
+from rftsim.surface import Array
+
+WHEEL_FILE: Final = "cmu_wheel_grouser.csv"
+PLATE_FILE: Final = "cmu_circular_plate_sinkage.csv"
+SMOOTH_FILE: Final = "cmu_wheel_smooth.csv"
+"""A smooth wheel in the same sand, of the same columns; not among the data that come with the grousered one."""
+
+
+class Runs(NamedTuple):
+    """Measured runs of a wheel, (n,) each; SI."""
+
+    slip: Array
+    angle: Array
+    """Slip angle [rad]."""
+    travel: Array
+    """[m/s]."""
+    rim: Array
+    """[m/s]."""
+    sinkage: Array
+    """Of the tips [m]."""
+    force: Array
+    """Drawbar, side and load [N], (n, 3)."""
+
+    def velocity(self, run: int) -> tuple[float, float]:
+        """Of the axle along and across the wheel's heading [m/s]."""
+        travel, angle = float(self.travel[run]), float(self.angle[run])
+        return travel * math.cos(angle), travel * math.sin(angle)
+
+
+class PlateTest(NamedTuple):
+    """A circular plate pushed into the sand."""
+
+    diameter: float
+    """[m]."""
+    depth: Array
+    """(n,) [m]."""
+    force: Array
+    """(n,) [N]."""
+
+    @property
+    def area(self) -> float:
+        """[m^2]."""
+        return math.pi / 4 * self.diameter**2
+
+
+def read_runs(path: Path) -> Runs:
+    """The runs in a wheel's file.
+
+    Raises:
+        RftsimError: The file lacks a column, or a number.
+    """
+    names = ("slip_ratio", "slip_angle_deg", "travel_speed_mm_s", "rim_speed_mm_s", "sinkage_mm")
+    columns = _columns(path, (), (*names, "F_drawbar_N", "F_sidewall_N", "F_load_N"))
+    slip, angle, travel, rim, sinkage, *force = (np.array(column) for column in columns.values())
+    return Runs(slip, np.radians(angle), travel / 1e3, rim / 1e3, sinkage / 1e3, np.column_stack(force))
+
+
+def read_plates(path: Path) -> list[PlateTest]:
+    """The tests in a plates' file.
+
+    Raises:
+        RftsimError: The file lacks a column, a number, or a second size of plate.
+    """
+    columns = _columns(path, ("box", "trial"), ("plate_diameter_mm", "depth_m", "force_N"))
+    labels = list(zip(columns["box"], columns["trial"], columns["plate_diameter_mm"], strict=True))
+    depth, force = np.array(columns["depth_m"]), np.array(columns["force_N"])
+    tests = []
+    for label in dict.fromkeys(labels):
+        own = np.array([other == label for other in labels])
+        tests.append(PlateTest(float(label[2]) / 1e3, depth[own], force[own]))
+    if len({test.diameter for test in tests}) < 2:
+        raise RftsimError(f"{path} has plates of one size; k_c and k_phi take two or more")
+    return tests
+
+
+def digest(path: Path) -> str:
+    """Of a file's content."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()[:12]
+
+
+def _columns(path: Path, words: tuple[str, ...], numbers: tuple[str, ...]) -> dict[str, list[float | str]]:
+    with path.open(newline="") as file:
+        lines = list(csv.DictReader(file))
+    if not lines:
+        raise RftsimError(f"{path} has no rows")
+    for name in (*words, *numbers):
+        if name not in lines[0]:
+            raise RftsimError(f"{path} has no column {name}")
+    try:
+        columns: dict[str, list[float | str]] = {name: [float(line[name]) for line in lines] for name in numbers}
+    except (ValueError, TypeError) as error:
+        raise RftsimError(f"{path} has something that is no number: {error}") from error
+    return columns | {name: [line[name] for line in lines] for name in words}
