@@ -126,4 +126,4 @@ def draw(measured: Measured, figure: Any) -> None:
         axis.set_title(name)
         axis.grid(alpha=0.3)
     panels[0].set_ylabel("deviation from the scaling law [%]")
-    panels[0].legend(fontsize=8, loc="lower right")
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=len(CASES) + 1)

@@ -92,6 +92,12 @@ def test_refusals_before_anything_runs(capsys, tmp_path, arguments, words):
     assert not (tmp_path / "memory").exists()
 
 
+def test_help_has_an_example(capsys):
+    code, out, _ = call(capsys, "--help")
+    assert code == 0
+    assert "Example: rftsim validate" in " ".join(out.split())
+
+
 def test_absent_data_are_said_and_do_not_fail(capsys, tmp_path):
     code, out, _ = call(capsys, "measured", "--data", tmp_path, "--memory", tmp_path / "m", "--plot", tmp_path)
     assert code == 0
