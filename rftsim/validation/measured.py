@@ -39,7 +39,7 @@ KNOWN: Final = {
 LEAST, SMOOTH = "least power", "smooth wheel"
 LITERATURE, OWN = "terramechanics, dry sand", "terramechanics, the plates"
 SOILS: Final = {
-    LITERATURE: "Wong-Reece; dry sand of [Wong2008] Table 2.3",
+    LITERATURE: "Wong-Reece; dry sand of [Wong2008]",
     OWN: "Wong-Reece; n, k_c, k_φ of the plates, φ 29°, K 25 mm [Wong2008]",
 }
 ABSENT: Final = "data not here"

@@ -40,8 +40,8 @@ class Soil(NamedTuple):
 
 SHEAR_LOOSE: Final = 0.025
 """K of loose sand, [Wong2008] [m]."""
-DRY_SAND: Final = Soil(990.0, 1.528e6, 1.1, math.tan(math.radians(28)), SHEAR_LOOSE, cohesion=1040.0)
-"""Dry sand of the Land Locomotion Laboratory, [Wong2008] Table 2.3."""
+DRY_SAND: Final = Soil(990.0, 1.52843e6, 1.1, math.tan(math.radians(28)), SHEAR_LOOSE, cohesion=1040.0)
+"""Dry sand of the Land Locomotion Laboratory, [Wong2008]."""
 POPPY: Final = Soil(0.0, float(PRESETS["poppy-seeds"].zeta or 0.0), 1.0, math.tan(math.radians(36)), 0.045)
 """Loose poppy seeds: the plate's 0.35 N/cm^3 of [Agarwal] Table 4.2, friction and K of [Agarwal2019]."""
 POPPY_SOURCE: Final = "Wong-Reece; plate of Table 4.2, φ and K of [Agarwal2019]"
