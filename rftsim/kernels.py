@@ -23,8 +23,6 @@ BLOCK = 64
 """Triangles that are evaluated together."""
 STEP = 1e300
 
-_C3 = tables.columns(tables.TABLE_C3)
-_C4 = tables.columns(tables.TABLE_C4)
 _T31 = tuple(tables.TABLE_3_1[key] for key in ("A00", "A10", "B11", "B01", "Bm11", "C11", "C01", "Cm11", "D10"))
 
 
@@ -62,11 +60,13 @@ class Medium(NamedTuple):
     """Rounding of the normals [-]: n.v_hat down to minus this counts as leading, n.up up to this as facing down."""
     ramp: Any
     """Steepness with which the leading-edge rule falls off below that [-]; STEP for the rule as published."""
+    table: Any
+    """Coefficients of f1, f2 and f3 of the 3D laws, in the order of Table C.4's rows; tuples, so that loops keep them."""
 
 
 @njit(forceinline=True)
 def cubic(c, x1, x2, x3):
-    """A column of [Agarwal] Table C.3, in the order of its rows, by Horner's scheme."""
+    """A cubic in x1, x2, x3, coefficients in the order of the rows of [Agarwal] Table C.3, by Horner's scheme."""
     return (
         c[0]
         + x1 * (c[1] + x1 * (c[4] + x1 * c[10] + x2 * c[14] + x3 * c[17]) + x2 * (c[7] + x2 * c[13] + x3 * c[19]))
@@ -77,7 +77,7 @@ def cubic(c, x1, x2, x3):
 
 @njit(forceinline=True)
 def quartic(c, x1, x2, x3):
-    """A column of [Agarwal] Table C.4: Table C.3's monomials first, then those of fourth degree."""
+    """A quartic, in the order of [Agarwal] Table C.4: Table C.3's monomials first, then those of fourth degree."""
     y1, y2, y3 = x1 * x1, x2 * x2, x3 * x3
     return (
         cubic(c, x1, x2, x3)
@@ -108,9 +108,7 @@ def _leading(vn, speed2, medium):
     return share if speed2 > 0.0 else 0.0
 
 
-def _stress_3d(fit: Any, c: Any) -> Any:
-    c1, c2, c3 = c
-
+def _stress_3d(fit: Any) -> Any:
     @njit(forceinline=True)
     def stress(nx, ny, nz, vx, vy, vz, frame, medium):
         """Stress of 3D-RFT per depth, [Agarwal] eqs. (5.5), (5.6), (5.9), and the inertial stress of eq. (4.2).
@@ -128,6 +126,7 @@ def _stress_3d(fit: Any, c: Any) -> Any:
         x1 = -vu
         x2 = -side * nu
         x3 = side * vn
+        c1, c2, c3 = medium.table
         f1 = fit(c1, x1, x2, x3)
         f2 = fit(c2, x1, x2, x3)
         f3 = fit(c3, x1, x2, x3)
@@ -345,7 +344,8 @@ def _jacobians(stress: Any) -> Any:
         v0x, v0y, v0z = frame.v0
         wx, wy, wz = frame.omega
         # the completed derivative takes the leading-edge rule apart
-        bare = Medium(medium.xi, medium.mu_surf, medium.lambda_rho, medium.edge_on, (1.0 - completed) * medium.ramp)
+        ramp = (1.0 - completed) * medium.ramp
+        bare = Medium(medium.xi, medium.mu_surf, medium.lambda_rho, medium.edge_on, ramp, medium.table)
         for i in range(BLOCK):
             x, y, z = k[i + 9 * BLOCK], k[i + 10 * BLOCK], k[i + 11 * BLOCK]
             n0, n1, n2, area = k[i + 12 * BLOCK], k[i + 13 * BLOCK], k[i + 14 * BLOCK], k[i + 15 * BLOCK]
@@ -370,8 +370,8 @@ def _jacobians(stress: Any) -> Any:
             vn = vx * m0 + vy * m1 + vz * m2
             share = completed * _leading(vn * inverse, speed2, medium) + (1.0 - completed)
             # a face's pressure P (1 + sign n.v) / 2 jumps at its edge: 1 / |n.v| is the secant of that sign
-            ramp = 0.5 / (radius * medium.ramp)
-            edge = -0.5 * completed * abs(s0 * m0 + s1 * m1 + s2 * m2) / larger(abs(vn + ramp), ramp) * weight * speed
+            width = 0.5 / (radius * medium.ramp)
+            edge = -0.5 * completed * abs(s0 * m0 + s1 * m1 + s2 * m2) / larger(abs(vn + width), width) * weight * speed
             i0, i1, i2 = inertia * m0, inertia * m1, inertia * m2
             along = share * weight * (completed + (1.0 - completed) * v_c * v_c * radius * radius)
             across = share * weight / d
@@ -435,8 +435,7 @@ def _add_rows(k, row, out):
         out[3 + before, c] -= arms[after][c]
 
 
-_stress_3d_cubic = _stress_3d(cubic, _C3)
-_stress_3d_quartic = _stress_3d(quartic, _C4)
+_stress_3d_cubic, _stress_3d_quartic = _stress_3d(cubic), _stress_3d(quartic)
 
 sums_2d, tractions_2d = _sums(_stress_2d), _tractions(_stress_2d)
 sums_3d, tractions_3d = _sums(_stress_3d_cubic), _tractions(_stress_3d_cubic)

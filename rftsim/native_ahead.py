@@ -41,7 +41,7 @@ def moving_frame(f, xmat, twist):
 @njit(forceinline=True)
 def _soft_medium(sand, surface):
     medium = packed.medium_of(sand, surface)
-    return kernels.Medium(medium.xi, medium.mu_surf, medium.lambda_rho, medium.edge_on, RAMP)
+    return kernels.Medium(medium.xi, medium.mu_surf, medium.lambda_rho, medium.edge_on, RAMP, medium.table)
 
 
 @njit(forceinline=True)

@@ -8,9 +8,10 @@ from typing import Final
 
 import numpy as np
 from numba import njit
+from numba.np.unsafe.ndarray import to_fixed_tuple
 from numpy.typing import ArrayLike
 
-from rftsim import kernels
+from rftsim import kernels, tables
 from rftsim.kernels import Frame, Medium
 from rftsim.laws import Law
 from rftsim.sand import FreeSurface, Sand
@@ -20,8 +21,9 @@ SAND_FIELDS: Final = (
     *("law", "planar", "dynamic", "up_x", "up_y", "up_z", "offset", "plane_x", "plane_y", "plane_z"),
     *("xi_n", "zeta", "mu_surf", "rho_c", "lambda_", "g"),
 )
-"""Entries of a packed sand, in order."""
-SAND_SIZE: Final = len(SAND_FIELDS)
+"""Entries of a packed sand, in order; behind them the coefficients of f1, f2 and f3, TERMS each."""
+TERMS: Final = len(tables.TABLE_C4)
+SAND_SIZE: Final = len(SAND_FIELDS) + 3 * TERMS
 STRENGTHS: Final = [SAND_FIELDS.index(name) for name in ("xi_n", "zeta")]
 """Where a packed sand has what scales its force, under the 3D laws and under the 2D ones."""
 
@@ -40,7 +42,7 @@ stand behind the columns."""
 
 
 def pack_sand(sand: Sand, law: Law, free_surface: FreeSurface, plane: ArrayLike) -> Array:
-    """A sand bed as numbers, in the order of SAND_FIELDS.
+    """A sand bed as numbers: those of SAND_FIELDS, then the law's coefficients; (SAND_SIZE,).
 
     Raises:
         SandError: The law is dynamic and the sand's density unknown.
@@ -54,7 +56,10 @@ def pack_sand(sand: Sand, law: Law, free_surface: FreeSurface, plane: ArrayLike)
     rho_c = sand.density() if law.dynamic else (sand.rho_c or 0.0)
     flags = (law.code, law.planar, law.dynamic)
     strength = (sand.xi_n, sand.zeta, sand.mu_surf, rho_c, sand.lambda_, sand.g)
-    return np.array([*flags, *up, free_surface.offset, *(normal / length), *strength], dtype=float)
+    table = np.zeros((3, TERMS))
+    for row, column in zip(table, tables.columns(law.table), strict=True):
+        row[: len(column)] = column
+    return np.array([*flags, *up, free_surface.offset, *(normal / length), *strength, *table.ravel()], dtype=float)
 
 
 def pack_surface(surface: Surface) -> Array:
@@ -172,7 +177,13 @@ def medium_of(sand, body):
     """The medium of a packed sand as its law sees it."""
     xi = sand[11] if sand[1] != 0.0 else sand[10]
     lambda_rho = sand[14] * sand[13] if sand[2] != 0.0 else 0.0
-    return Medium(xi, sand[12], lambda_rho, body[0], kernels.STEP)
+    first = len(SAND_FIELDS)
+    table = (
+        to_fixed_tuple(sand[first : first + TERMS], TERMS),
+        to_fixed_tuple(sand[first + TERMS : first + 2 * TERMS], TERMS),
+        to_fixed_tuple(sand[first + 2 * TERMS :], TERMS),
+    )
+    return Medium(xi, sand[12], lambda_rho, body[0], kernels.STEP, table)
 
 
 @njit(forceinline=True)

@@ -239,7 +239,7 @@ def _make_skin(model: mujoco.MjModel, start: mujoco.MjData, body: int) -> _Skin:
 
 
 def _make_plane(sand: Array) -> _Plane:
-    value = dict(zip(packed.SAND_FIELDS, sand.tolist(), strict=True))
+    value = dict(zip(packed.SAND_FIELDS, sand.tolist(), strict=False))
     up = np.array([value["up_x"], value["up_y"], value["up_z"]])
     along = np.array([up[2], 0.0, -up[0]]) / math.hypot(up[2], up[0])
     return _Plane(along, np.cross(up, along), up, value["offset"])

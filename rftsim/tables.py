@@ -107,9 +107,14 @@ up is pushed up.
 
 
 def columns(table: tuple[Term, ...]) -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]:
-    """The coefficients of f1, f2 and f3, each in the order of the table's rows."""
-    f1, f2, f3 = zip(*(coefficients for _, coefficients in table), strict=True)
+    """The coefficients of f1, f2 and f3, each in the order of the table's rows; empty where it has none."""
+    f1, f2, f3 = (tuple(coefficients[i] for _, coefficients in table) for i in range(3))
     return f1, f2, f3
+
+
+def monomials(degree: int) -> tuple[tuple[int, int, int], ...]:
+    """Powers of (x1, x2, x3) of a table of third or fourth degree, in the order of its rows."""
+    return tuple(powers for powers, _ in {3: TABLE_C3, 4: TABLE_C4}[degree])
 
 
 def _check(table: tuple[Term, ...], degree: int) -> None:

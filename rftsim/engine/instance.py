@@ -15,6 +15,7 @@ from numba import njit
 
 from rftsim import registry, state
 from rftsim.memory import characters, doubles, int32s, int64s, pointer
+from rftsim.packed import SAND_SIZE
 
 CHUNK: Final = 500
 """Numbers of one numeric: MuJoCo's XML reader takes no more. A surface goes on in the numerics behind its first."""
@@ -164,7 +165,7 @@ def initialise(model, data, m, d, instance):
     blank[0] = n
     entries = table(address)
     entries[1] = _find_numeric(model, m, _SAND_MARKER, instances[instance])
-    complete = entries[1] >= 0
+    complete = entries[1] >= 0 and numeric(model, m, entries[1]).size == SAND_SIZE
     k = HEAD
     for body in range(nbody):
         if plugins[body] == instance:
