@@ -61,7 +61,7 @@ class Medium(NamedTuple):
     ramp: Any
     """Steepness with which the leading-edge rule falls off below that [-]; STEP for the rule as published."""
     table: Any
-    """Coefficients of f1, f2 and f3 of the 3D laws, in the order of Table C.4's rows; tuples, so that loops keep them."""
+    """Coefficients of f1, f2 and f3 of the 3D laws, as the rows of Table C.4; tuples, so that loops keep them."""
 
 
 @njit(forceinline=True)

@@ -241,15 +241,24 @@ def make_sand(sand: "Sand | str | Mapping[str, Any]") -> Sand:
         raise SandError(f"sand must be a Sand, a name, key=value,..., a .toml file or a mapping, not {sand!r}")
     if sand in PRESETS:
         return PRESETS[sand]
-    if "=" in sand:
-        pairs = [_pair(item) for item in sand.split(",") if item.strip()]
+    return _from_mapping(read_parameters(sand))
+
+
+def read_parameters(text: str) -> dict[str, Any]:
+    """Parameters of a sand, as they stand in `key=value,...` or in a TOML file.
+
+    Raises:
+        SandError: It is neither, or the file cannot be read.
+    """
+    if "=" in text:
+        pairs = [_pair(item) for item in text.split(",") if item.strip()]
         repeated = [key for key, _ in pairs if sum(key == other for other, _ in pairs) > 1]
         if repeated:
-            raise SandError(f"{repeated[0]!r} is given twice in the sand {sand!r}")
-        return _from_mapping(dict(pairs))
-    if sand.endswith(".toml"):
-        return _from_mapping(_read_toml(Path(sand)))
-    raise SandError(f"no sand {sand!r}; presets are {', '.join(PRESETS)}; or give key=value,... or a .toml file")
+            raise SandError(f"{repeated[0]!r} is given twice in the sand {text!r}")
+        return dict(pairs)
+    if text.endswith(".toml"):
+        return _read_toml(Path(text))
+    raise SandError(f"no sand {text!r}; presets are {', '.join(PRESETS)}; or give key=value,... or a .toml file")
 
 
 def _pair(item: str) -> tuple[str, str]:

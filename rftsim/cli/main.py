@@ -11,6 +11,7 @@ from rich.markup import escape
 from rftsim.cli.bench import Bench
 from rftsim.cli.demo import Demo
 from rftsim.cli.evaluate import Evaluate
+from rftsim.cli.fit import Fit
 from rftsim.cli.force import Force
 from rftsim.cli.inspect import Inspect
 from rftsim.cli.play import Play
@@ -23,6 +24,7 @@ Command = (
     Annotated[Force, tyro.conf.subcommand("force")]
     | Annotated[Run, tyro.conf.subcommand("run")]
     | Annotated[Inspect, tyro.conf.subcommand("inspect")]
+    | Annotated[Fit, tyro.conf.subcommand("fit")]
     | Annotated[Demo, tyro.conf.subcommand("demo")]
     | Annotated[Bench, tyro.conf.subcommand("bench")]
     | Annotated[Validate, tyro.conf.subcommand("validate")]

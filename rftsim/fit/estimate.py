@@ -1,0 +1,69 @@
+"""Coefficients of a straight law with 95 % intervals: linear least squares, and a bootstrap beside it."""
+
+from typing import Final, NamedTuple
+
+import numpy as np
+from scipy.stats import t
+
+from rftsim.errors import RftsimError
+from rftsim.surface import Array
+
+CONFIDENCE: Final = 0.95
+DRAWS: Final = 2000
+"""Of the bootstrap."""
+
+
+class Estimate(NamedTuple):
+    """A coefficient."""
+
+    value: float
+    low: float
+    high: float
+    """Ends of the interval by Student's t: right for independent errors of one size."""
+    boot_low: float
+    boot_high: float
+    """Ends of the interval by a bootstrap of rows, or of whole tests where there are several: asks for neither."""
+
+    def over(self, divisor: float) -> "Estimate":
+        """The estimate of a quantity that is so many times smaller."""
+        return Estimate(*(x / divisor for x in self))
+
+
+def estimate(columns: Array, y: Array, tests: Array | None = None, *, draws: int = DRAWS) -> list[Estimate]:
+    """The coefficients c of y = columns c + error.
+
+    Args:
+        columns: (n, p).
+        y: (n,).
+        tests: Which test each row belongs to, (n,): rows of one test err together.
+        draws: Of the bootstrap; 0 for none.
+
+    Raises:
+        RftsimError: There are too few rows.
+    """
+    n, p = columns.shape
+    if n <= p:
+        raise RftsimError(f"{n} rows are too few for {p} coefficients and their intervals: give {p + 1} or more")
+    c, *_ = np.linalg.lstsq(columns, y)
+    variance = ((y - columns @ c) ** 2).sum() / (n - p)
+    reach = t.ppf(0.5 + CONFIDENCE / 2, n - p) * np.sqrt(variance * np.diag(np.linalg.inv(columns.T @ columns)))
+    apart = tests is not None and len(np.unique(tests)) > 2
+    boot = _bootstrap(columns, y, tests if apart and tests is not None else np.arange(n, dtype=float), draws)
+    return [Estimate(*row) for row in np.stack([c, c - reach, c + reach, *boot], axis=1).tolist()]
+
+
+def _bootstrap(columns: Array, y: Array, tests: Array, draws: int) -> tuple[Array, Array]:
+    """Ends of the intervals of the coefficients that samples with replacement have, (p,) both."""
+    rng = np.random.default_rng(0)
+    names, which = np.unique(tests, return_inverse=True)
+    parts = [columns[which == k] for k in range(len(names))]
+    squares = np.array([part.T @ part for part in parts])
+    products = np.array([part.T @ y[which == k] for k, part in enumerate(parts)])
+    counts = rng.multinomial(len(names), np.full(len(names), 1.0 / len(names)), size=draws)
+    left, right = np.tensordot(counts, squares, 1), counts @ products
+    regular = np.linalg.cond(left) < 1e12 if draws else np.zeros(0, bool)
+    if not regular.any():
+        return np.full(columns.shape[1], np.nan), np.full(columns.shape[1], np.nan)
+    drawn = np.linalg.solve(left[regular], right[regular][:, :, None])[:, :, 0]
+    low, high = np.quantile(drawn, [0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2], axis=0)
+    return low, high

@@ -1,0 +1,177 @@
+"""What a fitted table is worth: residuals, error on plates that were held back, the source's table beside it."""
+
+import dataclasses
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from rftsim.fit.dissipation import largest_power
+from rftsim.fit.generic import SOURCE, Generic, Settings, coefficients, determined, fit, nearest
+from rftsim.fit.plates import Plates, at_unit_depth, leading_faces
+from rftsim.laws import fitted_law
+from rftsim.rigid import surface_force
+from rftsim.sand import Sand
+from rftsim.surface import Array
+from rftsim.tables import Term
+
+FOLDS: Final = 10
+"""Parts of the plates that are held back, one after another."""
+PRIORS: Final = (0.0, 1.0, 3.0, 10.0, 30.0, 100.0)
+"""Weights among which the prior is chosen [plates]."""
+VERIFIED_DEG: Final = 3.0
+"""Step of the grid on which the power is verified [deg]: finer than that of the constraints."""
+
+
+class Errors(NamedTuple):
+    """Of predicted alpha against plates."""
+
+    rms: tuple[float, float, float]
+    """Per component, over xi_n [-]."""
+    relative: float
+    """Root of the sum of squares, over that of alpha [-]."""
+
+
+class Worst(NamedTuple):
+    """A plate that is fitted badly."""
+
+    angles: list[float]
+    """beta, gamma, psi [deg]."""
+    alpha: list[float]
+    """Over xi_n [-]."""
+    fitted: list[float]
+    """Over xi_n [-]."""
+    error: float
+    """Length of the difference, over xi_n [-]."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Report:
+    """A fitted table with its errors, all of the law as it is used: with |a_n| and the cap of eq. (5.6)."""
+
+    generic: Generic
+    settings: Settings
+    plates: Plates
+    mu_surf: float
+    rank: int
+    """Coefficients that the plates determine without the prior."""
+    predicted: Array
+    """alpha of the law [N/m^3], (n, 3)."""
+    predicted_held_back: Array
+    """alpha of laws fitted without the plate [N/m^3], (n, 3)."""
+    source: Errors
+    """Of the source's table, its scale fitted to the same plates."""
+    power: float
+    """Largest alpha_gen . v_hat at any angle, over xi_n [-]: where it is not positive, the law never adds energy."""
+
+    @property
+    def fitted(self) -> Errors:
+        """On the plates themselves."""
+        return errors(self.predicted, self.plates, self.generic.xi_n)
+
+    @property
+    def held_back(self) -> Errors:
+        """On plates that the fit did not see."""
+        return errors(self.predicted_held_back, self.plates, self.generic.xi_n)
+
+    @property
+    def edge_on(self) -> int:
+        """Plates that move along their own faces, where the law jumps."""
+        faces = leading_faces(self.plates)
+        return len(np.unique(faces.row[faces.edge_on]))
+
+    def worst(self, count: int = 5) -> list[Worst]:
+        """The plates that are fitted worst."""
+        xi_n = self.generic.xi_n
+        error = np.linalg.norm(self.predicted - self.plates.alpha, axis=1) / xi_n
+        columns = (self.plates.angles, self.plates.alpha / xi_n, self.predicted / xi_n, error)
+        return [Worst(*(column[i].tolist() for column in columns)) for i in np.argsort(-error)[:count]]
+
+    def doubts(self) -> list[str]:
+        """What is doubtful, with numbers."""
+        found = []
+        if self.rank < self.settings.unknowns:
+            found.append(
+                f"the plates determine {self.rank} of {self.settings.unknowns} coefficients; the others are of the "
+                f"source's table, which counts as {self.settings.prior:g} plates"
+            )
+        elif 3 * self.plates.n < 2 * self.settings.unknowns:
+            found.append(
+                f"{self.plates.n} plates are few for {self.settings.unknowns} coefficients: have "
+                f"{-(-2 * self.settings.unknowns // 3)} or more"
+            )
+        if not ((self.plates.angles[:, 0] == 0.0) & (self.plates.angles[:, 1] == 90.0)).any():
+            found.append("no plate is flat and pushed straight down: xi_n is an extrapolation")
+        if self.power > 0.0:
+            found.append(
+                f"the law can add energy: alpha_gen . v is up to {self.power:.2g} xi_n (--dissipative forbids it)"
+            )
+        return found
+
+
+def report(plates: Plates, settings: Settings, mu_surf: float, choose_prior: bool = False) -> Report:
+    """Fit, and say what the fit is worth.
+
+    Args:
+        plates: What was measured.
+        settings: How to fit.
+        mu_surf: Friction of the plates, for the law's cap.
+        choose_prior: Take from PRIORS the one with which held-back plates are predicted best.
+
+    Raises:
+        RftsimError: See `fit`.
+    """
+    rank = determined(plates, settings)
+    if choose_prior:
+        free = dataclasses.replace(settings, dissipative=False)
+        tried = [dataclasses.replace(free, prior=w) for w in PRIORS if w > 0.0 or rank == settings.unknowns]
+        missed = [((held_back(plates, one, mu_surf) - plates.alpha) ** 2).sum() for one in tried]
+        settings = dataclasses.replace(settings, prior=tried[int(np.argmin(missed))].prior)
+    generic = fit(plates, settings)
+    alone = dataclasses.replace(settings, prior=1e12, dissipative=False)
+    return Report(
+        generic=generic,
+        settings=settings,
+        plates=plates,
+        mu_surf=mu_surf,
+        rank=rank,
+        predicted=predict(generic.table, generic.xi_n, mu_surf, plates, settings.edges),
+        predicted_held_back=held_back(plates, settings, mu_surf),
+        source=_of_source(plates, alone, mu_surf),
+        power=largest_power(coefficients(generic.table), settings.degree, VERIFIED_DEG)[0],
+    )
+
+
+def _of_source(plates: Plates, alone: Settings, mu_surf: float) -> Errors:
+    table, xi_n = SOURCE[alone.degree], nearest(plates, alone).xi_n
+    return errors(predict(table, xi_n, mu_surf, plates, alone.edges), plates, xi_n)
+
+
+def errors(predicted: Array, plates: Plates, xi_n: float) -> Errors:
+    """Of predicted alpha, (n, 3)."""
+    off = predicted - plates.alpha
+    x, y, z = (np.sqrt((off**2).mean(axis=0)) / xi_n).tolist()
+    return Errors((x, y, z), float(np.sqrt((off**2).sum() / (plates.alpha**2).sum())))
+
+
+def held_back(plates: Plates, settings: Settings, mu_surf: float) -> Array:
+    """Stress per depth of each plate by a law that was fitted to the plates outside of its part, (n, 3)."""
+    count = plates.n
+    part = np.random.default_rng(0).permutation(count) % min(FOLDS, count)
+    found = np.empty((count, 3))
+    for k in range(part.max() + 1):
+        generic, out = nearest(plates.take(part != k), settings), part == k
+        found[out] = predict(generic.table, generic.xi_n, mu_surf, plates.take(out), settings.edges)
+    return found
+
+
+def predict(table: tuple[Term, ...], xi_n: float, mu_surf: float, plates: Plates, edges: bool) -> Array:
+    """Stress per depth of plates by the law with a table [N/m^3], (n, 3): that on every face that leads."""
+    law, sand = fitted_law(table), Sand(xi_n=xi_n, mu_surf=mu_surf)
+    faces = leading_faces(plates, edges)
+    alpha = np.zeros((plates.n, 3))
+    motions, which = np.unique(faces.motion, axis=0, return_inverse=True)
+    for k, motion in enumerate(motions):
+        own = which == k
+        stress = surface_force(at_unit_depth(faces.normal[own]), sand, law, velocity=motion).stress
+        np.add.at(alpha, faces.row[own], faces.weight[own, None] * stress)
+    return alpha
