@@ -6,54 +6,71 @@ a_n n.v + a_t.v = alpha_gen . v. What is constrained is therefore alpha_gen . v 
 coefficients, and it bounds the law at every mu_surf.
 """
 
+import itertools
+import math
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
 from scipy.linalg import solve_triangular
-from scipy.optimize import minimize, nnls
+from scipy.optimize import nnls
 
 from rftsim.errors import RftsimError
+from rftsim.fit.polynomials import terms
 from rftsim.surface import Array
-from rftsim.tables import monomials
 
 GRID_DEG: Final = 5.0
 """Step of the grid of angles on which the constraint is looked at [deg]; between its points, maxima are followed."""
-MARGIN: Final = 1e-6
+FINE_DEG: Final = 3.0
+"""Step of the grid from which the last maxima are followed [deg]."""
+MARGIN: Final = 1e-5
 """By how much alpha_gen . v stays below zero, in units of the plates' mean alpha [-]."""
 _ROUNDS: Final = 50
-_WORST: Final = 30
+_CUTS: Final = 50
+_STARTS: Final = 200
+_CLOSE: Final = 0.1
+_RANGE: Final = ((0.0, math.pi / 2), (-math.pi / 2, math.pi / 2), (0.0, math.pi))
+"""Of beta, gamma and psi [rad]: every orientation of a face and motion."""
 
 
 def power_rows(angles: Array, degree: int) -> Array:
     """The matrix from coefficients to alpha_gen . v at (beta, gamma, psi) [rad], (k, 3) to (k, 3 terms)."""
+    x = _projections(angles)
+    t = terms(x, degree)
+    return np.concatenate([x[:, 2:] * t, t, x[:, :1] * t], axis=1)
+
+
+def _projections(angles: Array) -> Array:
+    """x1, x2, x3 of [Agarwal] eq. (5.17), (k, 3)."""
     beta, gamma, psi = angles.T
     x1, x2 = np.sin(gamma), np.cos(beta)
-    x3 = np.cos(psi) * np.cos(gamma) * np.sin(beta) + x1 * x2
-    terms = np.prod(np.stack([x1, x2, x3], axis=1)[:, None, :] ** np.array(monomials(degree)), axis=2)
-    return np.concatenate([x3[:, None] * terms, terms, x1[:, None] * terms], axis=1)
+    return np.stack([x1, x2, np.cos(psi) * np.cos(gamma) * np.sin(beta) + x1 * x2], axis=1)
 
 
-def angle_grid(step_deg: float) -> Array:
-    """Every orientation and motion, (k, 3) [rad]: beta 0 to 90, gamma -90 to 90, psi 0 to 180 degrees."""
-    axes = [np.linspace(low, high, 1 + round((high - low) / step_deg)) for low, high in ((0, 90), (-90, 90), (0, 180))]
-    return np.radians(np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3))
+@lru_cache(maxsize=2)
+def _on_grid(step_deg: float, degree: int) -> tuple[Array, Array, Array]:
+    """A grid of every orientation and motion: angles [rad], (k, 3), their power rows, and which are close, (k,)."""
+    axes = [np.linspace(low, high, 1 + round((high - low) / step_deg)) for low, high in np.degrees(_RANGE)]
+    grid = np.radians(np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3))
+    cells = (_projections(grid) / _CLOSE).round() @ np.array([1.0, 1e3, 1e6])
+    return grid, power_rows(grid, degree), cells
 
 
 def largest_power(theta: Array, degree: int, step_deg: float) -> tuple[float, Array]:
-    """Largest alpha_gen . v, its maxima followed from the worst points of a grid; where they are, (k, 3) [rad]."""
-    grid = angle_grid(step_deg)
-    power = power_rows(grid, degree) @ theta
-    best, places = float(power.max()), []
-    for start in grid[np.argsort(-power)[: _WORST * 20 : 20]]:
-        found = minimize(
-            lambda x: -float(power_rows(x[None], degree)[0] @ theta),
-            start,
-            bounds=[(0.0, np.pi / 2), (-np.pi / 2, np.pi / 2), (0.0, np.pi)],
-            method="L-BFGS-B",
-        )
-        best = max(best, -float(found.fun))
-        places.append(found.x)
-    return best, np.array(places)
+    """Largest alpha_gen . v and where its maxima are, (k, 3) [rad].
+
+    From the best points of a grid, no two of them close in (x1, x2, x3), it goes uphill by ever smaller steps.
+    """
+    grid, rows, cells = _on_grid(step_deg, degree)
+    order = np.argsort(-(rows @ theta))
+    best = np.sort(np.unique(cells[order], return_index=True)[1])[:_STARTS]
+    places = grid[order[best]]
+    aside = np.array([*itertools.product((-1.0, 0.0, 1.0), repeat=3)])
+    for k in range(30):
+        around = np.clip(places[:, None] + math.radians(step_deg) * 0.65**k * aside, *np.transpose(_RANGE))
+        found = (power_rows(around.reshape(-1, 3), degree) @ theta).reshape(len(places), -1)
+        places = around[np.arange(len(places)), found.argmax(axis=1)]
+    return float((power_rows(places, degree) @ theta).max()), places
 
 
 def dissipative(a: Array, rhs: Array, start: Array, degree: int) -> Array:
@@ -65,19 +82,21 @@ def dissipative(a: Array, rhs: Array, start: Array, degree: int) -> Array:
     Raises:
         RftsimError: The constraints could not all be met.
     """
-    grid = angle_grid(GRID_DEG)
-    rows = power_rows(grid, degree)
+    _, rows, _ = _on_grid(GRID_DEG, degree)
     size = rows.shape[1]
     factor: Array = np.linalg.qr(np.column_stack([a, rhs]))[1]
     r, q = factor[:-1, :-1], factor[:-1, -1]
     cuts, x = np.empty((0, size)), start
     for _ in range(_ROUNDS):
         power = rows @ x[:size]
-        worst = np.argsort(-power)[:_WORST]
+        worst = np.argsort(-power)[:_CUTS]
         broken = rows[worst[power[worst] > -0.5 * MARGIN]]
         if not len(broken):
-            best, places = largest_power(x[:size], degree, GRID_DEG)
-            if best <= -0.5 * MARGIN:
+            for step in (GRID_DEG, FINE_DEG):
+                best, places = largest_power(x[:size], degree, step)
+                if best > -0.5 * MARGIN:
+                    break
+            else:
                 return x
             broken = power_rows(places, degree)
         cuts = np.vstack([cuts, broken])

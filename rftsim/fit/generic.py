@@ -7,6 +7,7 @@ Table C.3 has it, so that xi_n compares with Table C.1, and zeta = 0.87574 xi_n 
 
 import dataclasses
 import itertools
+from functools import lru_cache
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ import numpy as np
 from rftsim.errors import RftsimError
 from rftsim.fit.dissipation import dissipative
 from rftsim.fit.plates import Faces, Plates, leading_faces
+from rftsim.fit.polynomials import terms
 from rftsim.sand import ALPHA_Z_PLATE
 from rftsim.surface import EDGE_ON_DOUBLE, Array
 from rftsim.tables import TABLE_C3, TABLE_C4, Term, columns, monomials
@@ -58,9 +60,9 @@ def design(normal: Array, motion: Array, degree: int) -> Array:
     """The matrix from coefficients (f1's, f2's, f3's) to alpha_gen on faces, (k, 3, 3 terms)."""
     m = np.where(normal[:, 2:] <= EDGE_ON_DOUBLE, normal, -normal)
     x = np.stack([-motion[:, 2], -m[:, 2], (m * motion).sum(axis=1)], axis=1)
-    terms = np.prod(x[:, None, :] ** np.array(monomials(degree)), axis=2)
+    t = terms(x, degree)
     down = np.broadcast_to([0.0, 0.0, -1.0], m.shape)
-    return np.concatenate([vector[:, :, None] * terms[:, None, :] for vector in (m, motion, down)], axis=2)
+    return np.concatenate([vector[:, :, None] * t[:, None, :] for vector in (m, motion, down)], axis=2)
 
 
 def on_plates(faces: Faces, count: int, degree: int) -> Array:
@@ -141,9 +143,14 @@ def nearest(plates: Plates, settings: Settings) -> Generic:
 
 def _with_prior(a: Array, rhs: Array, settings: Settings) -> tuple[Array, Array]:
     """The problem with rows that ask for the source's table over its grid, times a scale, the last unknown."""
+    rows = _of_source(settings.degree)
+    weight = np.sqrt(settings.prior / (len(rows) / 3))
+    return np.vstack([np.column_stack([a, np.zeros(len(a))]), weight * rows]), np.append(rhs, np.zeros(len(rows)))
+
+
+@lru_cache(maxsize=2)
+def _of_source(degree: int) -> Array:
+    """The matrix from coefficients and a scale to what a table has more than the source's, over its grid."""
     grid = reference_grid()
-    rows = on_plates(leading_faces(grid), grid.n, settings.degree)
-    scaled = rows @ coefficients(SOURCE[settings.degree])
-    weight = np.sqrt(settings.prior / grid.n)
-    data = np.column_stack([a, np.zeros(len(a))])
-    return np.vstack([data, weight * np.column_stack([rows, -scaled])]), np.append(rhs, np.zeros(len(rows)))
+    rows = on_plates(leading_faces(grid), grid.n, degree)
+    return np.column_stack([rows, -rows @ coefficients(SOURCE[degree])])

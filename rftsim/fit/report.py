@@ -5,7 +5,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from rftsim.fit.dissipation import largest_power
+from rftsim.fit.dissipation import FINE_DEG, largest_power
 from rftsim.fit.generic import SOURCE, Generic, Settings, coefficients, determined, fit, nearest
 from rftsim.fit.plates import Plates, at_unit_depth, leading_faces
 from rftsim.laws import fitted_law
@@ -18,8 +18,6 @@ FOLDS: Final = 10
 """Parts of the plates that are held back, one after another."""
 PRIORS: Final = (0.0, 1.0, 3.0, 10.0, 30.0, 100.0)
 """Weights among which the prior is chosen [plates]."""
-VERIFIED_DEG: Final = 3.0
-"""Step of the grid on which the power is verified [deg]: finer than that of the constraints."""
 
 
 class Errors(NamedTuple):
@@ -137,7 +135,7 @@ def report(plates: Plates, settings: Settings, mu_surf: float, choose_prior: boo
         predicted=predict(generic.table, generic.xi_n, mu_surf, plates, settings.edges),
         predicted_held_back=held_back(plates, settings, mu_surf),
         source=_of_source(plates, alone, mu_surf),
-        power=largest_power(coefficients(generic.table), settings.degree, VERIFIED_DEG)[0],
+        power=largest_power(coefficients(generic.table), settings.degree, FINE_DEG)[0],
     )
 
 

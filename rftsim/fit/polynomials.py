@@ -1,0 +1,16 @@
+"""The monomials of which f1, f2 and f3 are made."""
+
+import numpy as np
+
+from rftsim.surface import Array
+from rftsim.tables import monomials
+
+
+def terms(x: Array, degree: int) -> Array:
+    """Monomials of x1, x2, x3, (k, 3), in the order of Table C.3 or C.4, (k, terms)."""
+    powers = np.ones((degree + 1, *x.shape))
+    for n in range(degree):
+        powers[n + 1] = powers[n] * x
+    i, j, k = np.array(monomials(degree)).T
+    found: Array = (powers[i, :, 0] * powers[j, :, 1] * powers[k, :, 2]).T
+    return found
