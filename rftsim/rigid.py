@@ -45,7 +45,7 @@ def surface_force(
     Args:
         surface: Triangles in the body frame.
         sand: The medium.
-        law: A law or its name.
+        law: A law, its name, or `rft3d:FILE.toml`, see `get_law`.
         position: The body's origin [m].
         rotation: Body to world, shape (3, 3).
         velocity: Of the body's origin [m/s].

@@ -67,7 +67,7 @@ def add_sand(
     Args:
         spec: The model; changed in place.
         sand: The medium, see `make_sand`.
-        law: A law or its name.
+        law: A law, its name, or `rft3d:FILE.toml`, see `get_law`.
         bodies: Names of the bodies that feel the sand; by default each that can move and has geoms.
         surface: The free surface, or its height [m].
         plane: Normal of the vertical plane of motion, for the 2D laws.
@@ -147,7 +147,7 @@ def load(
     Args:
         source: Path of an MJCF or URDF file, or the XML itself.
         sand: The medium, see `make_sand`.
-        law: A law or its name.
+        law: A law, its name, or `rft3d:FILE.toml`, see `get_law`.
         **options: Those of `add_sand`.
 
     Raises:

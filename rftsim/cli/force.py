@@ -32,7 +32,7 @@ class Force:
     angular_velocity: Vector = (0.0, 0.0, 0.0)
     """Angular velocity, world frame [rad/s]."""
     law: str = "rft3d"
-    """rft2d, drft2d, rft3d, drft3d; rft3d:c4 takes the quartic table."""
+    """rft2d, drft2d, rft3d, drft3d; rft3d:c4 takes the quartic table, rft3d:FILE.toml that of `rftsim fit map`."""
     sand: str = "poppy-seeds"
     """A preset, key=value,... or a TOML file."""
     plane: Vector = (0.0, 1.0, 0.0)

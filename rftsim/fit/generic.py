@@ -14,7 +14,7 @@ import numpy as np
 
 from rftsim.errors import RftsimError
 from rftsim.fit.dissipation import dissipative
-from rftsim.fit.plates import Faces, Plates, leading_faces
+from rftsim.fit.plates import Counted, Faces, Plates, leading_faces
 from rftsim.fit.polynomials import terms
 from rftsim.sand import ALPHA_Z_PLATE
 from rftsim.surface import EDGE_ON_DOUBLE, Array
@@ -32,13 +32,13 @@ class Settings:
         degree: Of the polynomials: 3 (20 terms each) or 4 (35).
         prior: As how many plates over its reference grid the source's table of this degree counts, to scale.
         dissipative: Hold alpha_gen . v <= 0 at every orientation and motion, see `dissipation`.
-        edges: Count the four narrow faces of thick plates; otherwise the wide ones carry everything, as in the source.
+        counted: Which faces of a plate carry its force, see `plates.Counted`.
     """
 
     degree: int = 3
     prior: float = 0.0
     dissipative: bool = False
-    edges: bool = False
+    counted: Counted = "plate"
 
     @property
     def unknowns(self) -> int:
@@ -72,8 +72,9 @@ def on_plates(faces: Faces, count: int, degree: int) -> Array:
     tangential part.
     """
     rows = design(faces.normal, faces.motion, degree)
-    n = faces.normal[faces.edge_on]
-    rows[faces.edge_on] -= n[:, :, None] * np.einsum("ki,kij->kj", n, rows[faces.edge_on])[:, None, :]
+    cancel = faces.edge_on & faces.paired
+    n = faces.normal[cancel]
+    rows[cancel] -= n[:, :, None] * np.einsum("ki,kij->kj", n, rows[cancel])[:, None, :]
     found = np.zeros((count, *rows.shape[1:]))
     np.add.at(found, faces.row, faces.weight[:, None, None] * rows)
     return found.reshape(3 * count, -1)
@@ -108,7 +109,7 @@ def fit(plates: Plates, settings: Settings) -> Generic:
 
 def determined(plates: Plates, settings: Settings) -> int:
     """How many coefficients plates determine without a prior."""
-    a = on_plates(leading_faces(plates, settings.edges), plates.n, settings.degree)
+    a = on_plates(leading_faces(plates, settings.counted), plates.n, settings.degree)
     return int(np.linalg.matrix_rank(a, tol=1e-9 * np.linalg.norm(a, 2)))
 
 
@@ -118,7 +119,7 @@ def nearest(plates: Plates, settings: Settings) -> Generic:
     Raises:
         RftsimError: The plates feel no force, or by their fit none that has a scale.
     """
-    a = on_plates(leading_faces(plates, settings.edges), plates.n, settings.degree)
+    a = on_plates(leading_faces(plates, settings.counted), plates.n, settings.degree)
     unit = float(np.sqrt((plates.alpha**2).sum(axis=1).mean()))
     if not unit > 0.0:
         raise RftsimError("the plates feel no force")

@@ -7,7 +7,7 @@ import numpy as np
 
 from rftsim.fit.dissipation import FINE_DEG, largest_power
 from rftsim.fit.generic import SOURCE, Generic, Settings, coefficients, determined, fit, nearest
-from rftsim.fit.plates import Plates, at_unit_depth, leading_faces
+from rftsim.fit.plates import Counted, Plates, at_unit_depth, leading_faces
 from rftsim.laws import fitted_law
 from rftsim.rigid import surface_force
 from rftsim.sand import Sand
@@ -132,7 +132,7 @@ def report(plates: Plates, settings: Settings, mu_surf: float, choose_prior: boo
         plates=plates,
         mu_surf=mu_surf,
         rank=rank,
-        predicted=predict(generic.table, generic.xi_n, mu_surf, plates, settings.edges),
+        predicted=predict(generic.table, generic.xi_n, mu_surf, plates, settings.counted),
         predicted_held_back=held_back(plates, settings, mu_surf),
         source=_of_source(plates, alone, mu_surf),
         power=largest_power(coefficients(generic.table), settings.degree, FINE_DEG)[0],
@@ -141,7 +141,7 @@ def report(plates: Plates, settings: Settings, mu_surf: float, choose_prior: boo
 
 def _of_source(plates: Plates, alone: Settings, mu_surf: float) -> Errors:
     table, xi_n = SOURCE[alone.degree], nearest(plates, alone).xi_n
-    return errors(predict(table, xi_n, mu_surf, plates, alone.edges), plates, xi_n)
+    return errors(predict(table, xi_n, mu_surf, plates, alone.counted), plates, xi_n)
 
 
 def errors(predicted: Array, plates: Plates, xi_n: float) -> Errors:
@@ -158,14 +158,14 @@ def held_back(plates: Plates, settings: Settings, mu_surf: float) -> Array:
     found = np.empty((count, 3))
     for k in range(part.max() + 1):
         generic, out = nearest(plates.take(part != k), settings), part == k
-        found[out] = predict(generic.table, generic.xi_n, mu_surf, plates.take(out), settings.edges)
+        found[out] = predict(generic.table, generic.xi_n, mu_surf, plates.take(out), settings.counted)
     return found
 
 
-def predict(table: tuple[Term, ...], xi_n: float, mu_surf: float, plates: Plates, edges: bool) -> Array:
+def predict(table: tuple[Term, ...], xi_n: float, mu_surf: float, plates: Plates, counted: Counted) -> Array:
     """Stress per depth of plates by the law with a table [N/m^3], (n, 3): that on every face that leads."""
     law, sand = fitted_law(table), Sand(xi_n=xi_n, mu_surf=mu_surf)
-    faces = leading_faces(plates, edges)
+    faces = leading_faces(plates, counted)
     alpha = np.zeros((plates.n, 3))
     motions, which = np.unique(faces.motion, axis=0, return_inverse=True)
     for k, motion in enumerate(motions):

@@ -20,9 +20,9 @@ ROUGH = 1e9
 XI_N = 0.92e6
 
 
-def measured(table, plates, mu_surf=ROUGH, edges=False):
+def measured(table, plates, mu_surf=ROUGH):
     """The plates with the stress that the law with a table has on them."""
-    return plates._replace(alpha=predict(table, XI_N, mu_surf, plates, edges))
+    return plates._replace(alpha=predict(table, XI_N, mu_surf, plates, "plate"))
 
 
 def where_linear(table, plates):
@@ -76,15 +76,15 @@ def test_a_fit_to_noise_has_the_symmetries(grid):
             np.testing.assert_allclose(alpha(r @ n, r @ v, law), r @ force, rtol=0, atol=1e-12 * np.abs(force).max())
 
 
-@pytest.mark.parametrize("edges", [False, True])
-def test_a_plates_force_is_that_of_its_faces(edges):
+@pytest.mark.parametrize("counted", ["plate", "box", "face"])
+def test_a_plates_force_is_that_of_its_faces(counted):
     """A box of 1 x 1 x 0.2 slices down at depth 1: two sides, two ends, and a lower edge half a length deeper."""
     knife = Plates(np.array([[90.0, 90.0, 0.0]]), np.zeros((1, 3)), np.array([0.2]), np.ones(1))
     side, below = alpha((1, 0, 0), (0, 0, -1)), alpha((0, 0, -1), (0, 0, -1))
     ends = 2 * 0.2 * alpha((0, 1, 0), (0, 0, -1))[2]
-    expected = 2 * side[2] + edges * (0.2 * 1.5 * below[2] + ends)
-    felt = predict(TABLE_C3, 1.0, ROUGH, knife, edges)[0]
-    np.testing.assert_allclose(felt, [0.0, 0.0, expected], atol=1e-12)
+    expected = {"plate": 2 * side[2], "box": 2 * side[2] + 0.2 * 1.5 * below[2] + ends, "face": side[2]}
+    felt = predict(TABLE_C3, 1.0, ROUGH, knife, counted)[0]
+    np.testing.assert_allclose(felt, [side[0] * (counted == "face"), 0.0, expected[counted]], atol=1e-12)
 
 
 def test_held_back_error_is_that_of_the_noise(grid):
@@ -142,7 +142,7 @@ def test_a_dissipative_fit_never_adds_energy(grid, degree):
     angles = np.random.default_rng(5).uniform([-90, -90, 0], [90, 90, 180], size=(500, 3))
     some = Plates(angles, np.zeros((500, 3)), np.zeros(500), np.ones(500))
     for mu_surf in (0.0, 0.2, 0.6, ROUGH):
-        force = predict(held.table, 1.0, mu_surf, some, False)
+        force = predict(held.table, 1.0, mu_surf, some, "plate")
         assert (force * directions(angles)[1]).sum(axis=1).max() <= 0.0
 
 
