@@ -46,7 +46,7 @@ def _number(row: list[str], at: int, where: str) -> float:
     try:
         value = float(row[at])
     except (ValueError, IndexError):
-        raise RftsimError(f"{where}: {row[at] if at < len(row) else 'nothing'!r} is no number") from None
+        raise RftsimError(f"{where}: {repr(row[at]) if at < len(row) else 'nothing'} is no number") from None
     if not math.isfinite(value):
         raise RftsimError(f"{where}: {value} is not finite")
     return value

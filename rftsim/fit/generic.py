@@ -1,12 +1,14 @@
-"""The generic response of 3D-RFT fitted to plates: f1, f2, f3 as polynomials, by linear least squares.
+"""The generic response of 3D-RFT fitted to plates: f1, f2, f3 as polynomials, by least squares.
 
-alpha = xi_n (f1 m + f2 v - f3 z), [Agarwal] eq. (5.9), is linear in the polynomials' coefficients, and isotropic
-whatever they are. The scale is told from them by the flat plate pushed straight down: there alpha_z = 0.87574 xi_n, as
-Table C.3 has it, so that xi_n compares with Table C.1, and zeta = 0.87574 xi_n holds for every table.
+alpha_gen = f1 m + f2 v - f3 z, [Agarwal] eq. (5.9), is linear in the polynomials' coefficients, and isotropic whatever
+they are. What is fitted is the law that is made of it, with |a_n| and the cap by mu_surf. The scale is told from the
+coefficients by the flat plate pushed straight down: there alpha_z = 0.87574 xi_n, as Table C.3 has it, so that xi_n
+compares with Table C.1, and zeta = 0.87574 xi_n holds for every table.
 """
 
 import dataclasses
 import itertools
+import math
 from functools import lru_cache
 from typing import Final, NamedTuple
 
@@ -22,6 +24,9 @@ from rftsim.tables import TABLE_C3, TABLE_C4, Term, columns, monomials
 
 SOURCE: Final = {3: TABLE_C3, 4: TABLE_C4}
 """The source's tables by degree."""
+_ROUNDS: Final = 40
+_CONSTRAINED_ROUNDS: Final = 6
+_SETTLED: Final = 1e-4
 
 
 @dataclasses.dataclass(frozen=True)
@@ -33,12 +38,14 @@ class Settings:
         prior: As how many plates over its reference grid the source's table of this degree counts, to scale.
         dissipative: Hold alpha_gen . v <= 0 at every orientation and motion, see `dissipation`.
         counted: Which faces of a plate carry its force, see `plates.Counted`.
+        mu_surf: Friction of the plates, for the law's cap.
     """
 
     degree: int = 3
     prior: float = 0.0
     dissipative: bool = False
     counted: Counted = "plate"
+    mu_surf: float = math.inf
 
     @property
     def unknowns(self) -> int:
@@ -75,9 +82,15 @@ def on_plates(faces: Faces, count: int, degree: int) -> Array:
     cancel = faces.edge_on & faces.paired
     n = faces.normal[cancel]
     rows[cancel] -= n[:, :, None] * np.einsum("ki,kij->kj", n, rows[cancel])[:, None, :]
-    found = np.zeros((count, *rows.shape[1:]))
-    np.add.at(found, faces.row, faces.weight[:, None, None] * rows)
-    return found.reshape(3 * count, -1)
+    return _by_plate(faces, faces.weight[:, None, None] * rows, count).reshape(3 * count, -1)
+
+
+def _by_plate(faces: Faces, values: Array, count: int) -> Array:
+    """Sums of values on faces, (k, ...), over each plate, (count, ...)."""
+    order = np.argsort(faces.row, kind="stable")
+    starts = np.searchsorted(faces.row[order], np.arange(count))
+    found: Array = np.add.reduceat(values[order], starts, axis=0)
+    return found
 
 
 def reference_grid() -> Plates:
@@ -123,13 +136,7 @@ def nearest(plates: Plates, settings: Settings) -> Generic:
     unit = float(np.sqrt((plates.alpha**2).sum(axis=1).mean()))
     if not unit > 0.0:
         raise RftsimError("the plates feel no force")
-    rhs = plates.alpha.ravel() / unit
-    if settings.prior > 0.0:
-        a, rhs = _with_prior(a, rhs, settings)
-    theta = np.asarray(np.linalg.lstsq(a, rhs, rcond=1e-12)[0], dtype=float)
-    if settings.dissipative:
-        theta = dissipative(a, rhs, theta, settings.degree)
-    theta = theta[: settings.unknowns]
+    theta = _solve(plates._replace(alpha=plates.alpha / unit), settings)
     down = np.array([[0.0, 0.0, -1.0]])
     flat = float(design(down, down, settings.degree)[0, 2] @ theta)
     if not flat > 0.0:
@@ -139,19 +146,100 @@ def nearest(plates: Plates, settings: Settings) -> Generic:
         )
     f = (theta * ALPHA_Z_PLATE / flat).reshape(3, -1).T.tolist()
     table = tuple((powers, (p, q, r)) for powers, (p, q, r) in zip(monomials(settings.degree), f, strict=True))
-    return Generic(table, unit * flat / ALPHA_Z_PLATE, float(np.linalg.cond(a)))
+    return Generic(table, unit * flat / ALPHA_Z_PLATE, float(np.linalg.cond(_with_prior(a, settings))))
 
 
-def _with_prior(a: Array, rhs: Array, settings: Settings) -> tuple[Array, Array]:
-    """The problem with rows that ask for the source's table over its grid, times a scale, the last unknown."""
-    rows = _of_source(settings.degree)
-    weight = np.sqrt(settings.prior / (len(rows) / 3))
-    return np.vstack([np.column_stack([a, np.zeros(len(a))]), weight * rows]), np.append(rhs, np.zeros(len(rows)))
+def _solve(plates: Plates, settings: Settings) -> Array:
+    """Coefficients, (3 terms,): of the linear problem, then by Gauss-Newton steps of the law itself.
+
+    The law is not linear: it has |a_n| and the cap of eq. (5.6). A step counts where it brings the law nearer to the
+    plates, and is damped where it does not.
+    """
+    faces, measured = leading_faces(plates, settings.counted), plates.alpha.ravel()
+    rows = design(faces.normal, faces.motion, settings.degree)
+
+    def law(theta: Array) -> tuple[float, Array, Array]:
+        """The cost, and the linear problem for the next step."""
+        own = theta[: settings.unknowns]
+        stress, slope = law_and_slope(faces, rows, own, settings)
+        alpha = _by_plate(faces, stress, plates.n).ravel()
+        slope = _by_plate(faces, slope, plates.n).reshape(len(alpha), -1)
+        return _cost(alpha, theta, measured, settings), slope, measured - alpha + slope @ own
+
+    theta = _least(on_plates(faces, plates.n, settings.degree), measured, settings, None, 0.0)
+    damping = 1e-3
+    for step in [dataclasses.replace(settings, dissipative=False)] + settings.dissipative * [settings]:
+        free = step is not settings
+        if not free:
+            theta = _least(*law(theta)[1:], step, theta, damping)
+        cost, *linear = law(theta)
+        for _ in range(_ROUNDS if free else _CONSTRAINED_ROUNDS):
+            trial = _least(*linear, step, theta, damping)
+            reached, *there = law(trial)
+            settled = abs(cost - reached) <= _SETTLED * cost
+            if reached < cost:
+                theta, cost, linear, damping = trial, reached, there, max(0.2 * damping, 1e-9)
+            else:
+                damping *= 10.0
+            if settled or damping > 1e3:
+                break
+    return theta[: settings.unknowns]
+
+
+def _least(rows: Array, rhs: Array, settings: Settings, near: Array | None, damping: float) -> Array:
+    """The x nearest to rows x = rhs under prior (whose scale is its last) and constraint, damped towards `near`."""
+    a = _with_prior(rows, settings)
+    b = np.append(rhs, np.zeros(len(a) - len(rhs)))
+    if near is not None:
+        a, b = np.vstack([a, np.sqrt(damping) * np.eye(len(near))]), np.append(b, np.sqrt(damping) * near)
+    x = np.asarray(np.linalg.lstsq(a, b, rcond=1e-12)[0], dtype=float)
+    return dissipative(a, b, x, settings.degree) if settings.dissipative else x
+
+
+def _cost(alpha: Array, theta: Array, measured: Array, settings: Settings) -> float:
+    away = _with_prior(np.zeros((0, settings.unknowns)), settings) @ theta
+    return float(((alpha - measured) ** 2).sum() + (away**2).sum())
+
+
+def law_and_slope(faces: Faces, rows: Array, theta: Array, settings: Settings) -> tuple[Array, Array]:
+    """The law on faces, at xi_n = 1, and its derivative by the coefficients, [Agarwal] eqs. (5.5) and (5.6).
+
+    Args:
+        faces: Those that lead.
+        rows: Their `design`.
+        theta: Coefficients, (3 terms,).
+        settings: For mu_surf.
+
+    Returns:
+        Stress per depth times weight, (k, 3), and its derivative, (k, 3, 3 terms).
+    """
+    n = faces.normal
+    a = rows @ theta
+    rows_n, a_n = np.einsum("ki,kij->kj", n, rows), (n * a).sum(axis=1)
+    rows_t, a_t = rows - n[:, :, None] * rows_n[:, None, :], a - a_n[:, None] * n
+    size, most = np.linalg.norm(a_t, axis=1), settings.mu_surf * np.abs(a_n)
+    capped, sign = size > most, np.where(a_n > 0.0, 1.0, -1.0)
+    hat = a_t[capped] / size[capped, None]
+    turned = rows_t[capped] - hat[:, :, None] * np.einsum("ki,kij->kj", hat, rows_t[capped])[:, None, :]
+    grown = (settings.mu_surf * sign[capped])[:, None, None] * hat[:, :, None] * rows_n[capped, None, :]
+    rows_t[capped] = (most / np.where(capped, size, 1.0))[capped, None, None] * turned + grown
+    a_t[capped] = most[capped, None] * hat
+    stress = faces.weight[:, None] * (a_t - np.abs(a_n)[:, None] * n)
+    slope = faces.weight[:, None, None] * (rows_t - (sign[:, None] * n)[:, :, None] * rows_n[:, None, :])
+    return stress, slope
+
+
+def _with_prior(rows: Array, settings: Settings) -> Array:
+    """Rows of a problem and, with a prior, those that ask for the source's table times a scale, the last unknown."""
+    if not settings.prior > 0.0:
+        return rows
+    weight = np.sqrt(settings.prior / reference_grid().n)
+    return np.vstack([np.column_stack([rows, np.zeros(len(rows))]), weight * _of_source(settings.degree)])
 
 
 @lru_cache(maxsize=2)
 def _of_source(degree: int) -> Array:
-    """The matrix from coefficients and a scale to what a table has more than the source's, over its grid."""
+    """The matrix from coefficients and a scale to how far a table is from the source's over its grid, made square."""
     grid = reference_grid()
     rows = on_plates(leading_faces(grid), grid.n, degree)
-    return np.column_stack([rows, -rows @ coefficients(SOURCE[degree])])
+    return np.asarray(np.linalg.qr(np.column_stack([rows, -rows @ coefficients(SOURCE[degree])]))[1])

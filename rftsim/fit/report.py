@@ -118,14 +118,13 @@ def report(plates: Plates, settings: Settings, mu_surf: float, choose_prior: boo
     Raises:
         RftsimError: See `fit`.
     """
-    rank = determined(plates, settings)
+    rank, settings = determined(plates, settings), dataclasses.replace(settings, mu_surf=mu_surf)
     if choose_prior:
         free = dataclasses.replace(settings, dissipative=False)
         tried = [dataclasses.replace(free, prior=w) for w in PRIORS if w > 0.0 or rank == settings.unknowns]
-        missed = [((held_back(plates, one, mu_surf) - plates.alpha) ** 2).sum() for one in tried]
+        missed = [((held_back(plates, one) - plates.alpha) ** 2).sum() for one in tried]
         settings = dataclasses.replace(settings, prior=tried[int(np.argmin(missed))].prior)
     generic = fit(plates, settings)
-    alone = dataclasses.replace(settings, prior=1e12, dissipative=False)
     return Report(
         generic=generic,
         settings=settings,
@@ -133,15 +132,17 @@ def report(plates: Plates, settings: Settings, mu_surf: float, choose_prior: boo
         mu_surf=mu_surf,
         rank=rank,
         predicted=predict(generic.table, generic.xi_n, mu_surf, plates, settings.counted),
-        predicted_held_back=held_back(plates, settings, mu_surf),
-        source=_of_source(plates, alone, mu_surf),
+        predicted_held_back=held_back(plates, settings),
+        source=_of_source(plates, settings),
         power=largest_power(coefficients(generic.table), settings.degree, FINE_DEG)[0],
     )
 
 
-def _of_source(plates: Plates, alone: Settings, mu_surf: float) -> Errors:
-    table, xi_n = SOURCE[alone.degree], nearest(plates, alone).xi_n
-    return errors(predict(table, xi_n, mu_surf, plates, alone.counted), plates, xi_n)
+def _of_source(plates: Plates, settings: Settings) -> Errors:
+    table = SOURCE[settings.degree]
+    unit = predict(table, 1.0, settings.mu_surf, plates, settings.counted)
+    xi_n = float((unit * plates.alpha).sum() / (unit**2).sum())
+    return errors(xi_n * unit, plates, xi_n)
 
 
 def errors(predicted: Array, plates: Plates, xi_n: float) -> Errors:
@@ -151,20 +152,20 @@ def errors(predicted: Array, plates: Plates, xi_n: float) -> Errors:
     return Errors((x, y, z), float(np.sqrt((off**2).sum() / (plates.alpha**2).sum())))
 
 
-def held_back(plates: Plates, settings: Settings, mu_surf: float) -> Array:
+def held_back(plates: Plates, settings: Settings) -> Array:
     """Stress per depth of each plate by a law that was fitted to the plates outside of its part, (n, 3)."""
     count = plates.n
     part = np.random.default_rng(0).permutation(count) % min(FOLDS, count)
     found = np.empty((count, 3))
     for k in range(part.max() + 1):
         generic, out = nearest(plates.take(part != k), settings), part == k
-        found[out] = predict(generic.table, generic.xi_n, mu_surf, plates.take(out), settings.counted)
+        found[out] = predict(generic.table, generic.xi_n, settings.mu_surf, plates.take(out), settings.counted)
     return found
 
 
 def predict(table: tuple[Term, ...], xi_n: float, mu_surf: float, plates: Plates, counted: Counted) -> Array:
     """Stress per depth of plates by the law with a table [N/m^3], (n, 3): that on every face that leads."""
-    law, sand = fitted_law(table), Sand(xi_n=xi_n, mu_surf=mu_surf)
+    law, sand = fitted_law(table), Sand(xi_n=xi_n, mu_surf=min(mu_surf, 1e9))
     faces = leading_faces(plates, counted)
     alpha = np.zeros((plates.n, 3))
     motions, which = np.unique(faces.motion, axis=0, return_inverse=True)

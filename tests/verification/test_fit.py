@@ -7,9 +7,9 @@ import pytest
 from shapes import about, alpha, unit
 
 from rftsim.errors import RftsimError
-from rftsim.fit.dissipation import MARGIN, largest_power, power_rows
+from rftsim.fit.dissipation import MARGIN, dissipative, largest_power, power_rows
 from rftsim.fit.estimate import estimate
-from rftsim.fit.generic import Settings, coefficients, design, fit, on_plates, reference_grid
+from rftsim.fit.generic import Settings, coefficients, design, fit, law_and_slope, on_plates, reference_grid
 from rftsim.fit.plates import Plates, directions, leading_faces
 from rftsim.fit.report import predict, report
 from rftsim.laws import fitted_law
@@ -146,24 +146,44 @@ def test_a_dissipative_fit_never_adds_energy(grid, degree):
         assert (force * directions(angles)[1]).sum(axis=1).max() <= 0.0
 
 
-def test_the_dissipative_fit_is_the_best_one(grid):
-    """No small change of the table that keeps alpha_gen . v <= 0 brings it nearer to the data: it is optimal."""
+def test_the_constrained_solution_is_the_best_one(grid):
+    """The feasible set is convex, so the gradient of the squares points away from every other feasible table."""
     plates = measured(TABLE_C3, grid.take(~on_edge(grid)))
     v = directions(plates.angles)[1]
-    plates = plates._replace(alpha=plates.alpha + 0.1 * XI_N * v * (v[:, 2:] > 0.3))
-    generic = fit(plates, Settings(dissipative=True))
+    rhs = (plates.alpha / XI_N + 0.1 * v * (v[:, 2:] > 0.3)).ravel()
     a = on_plates(leading_faces(plates), plates.n, 3)
-    theta = coefficients(generic.table) * generic.xi_n / XI_N
-    uphill = a.T @ (a @ theta - plates.alpha.ravel() / XI_N)
-    inside = fit(measured(TABLE_C4, plates), Settings(dissipative=True)).table
+    theta = dissipative(a, rhs, np.linalg.lstsq(a, rhs)[0], 3)
+    uphill = a.T @ (a @ theta - rhs)
     rng = np.random.default_rng(6)
-    others = [coefficients(inside), 0 * theta]
-    for _ in range(2):
-        disturbed = plates._replace(alpha=plates.alpha + 0.05 * XI_N * rng.normal(size=(plates.n, 3)))
-        other = fit(disturbed, Settings(dissipative=True))
-        others.append(coefficients(other.table) * other.xi_n / XI_N)
-    for other in others:  # the feasible set is convex
-        assert uphill @ (other - theta) >= -1e-6 * np.linalg.norm(uphill) * np.linalg.norm(other - theta)
+    others = [0 * theta]
+    for _ in range(3):
+        other = rhs + 0.05 * rng.normal(size=len(rhs))
+        others.append(dissipative(a, other, theta, 3))
+    for other in others:
+        assert uphill @ (other - theta) >= -1e-4 * np.linalg.norm(uphill) * np.linalg.norm(other - theta)
+
+
+@pytest.mark.parametrize("counted", ["plate", "box", "face"])
+@pytest.mark.parametrize("mu_surf", [0.2, 0.4, np.inf])
+def test_the_law_that_is_fitted_is_the_compiled_one(grid, counted, mu_surf):
+    """Stress of eqs. (5.5), (5.6) as the fit sees it against the compiled law's; its derivative against differences."""
+    faces, settings, theta = leading_faces(grid, counted), Settings(mu_surf=mu_surf), coefficients(TABLE_C3)
+    rows = design(faces.normal, faces.motion, 3)
+    stress, slope = law_and_slope(faces, rows, theta, settings)
+    alpha = np.zeros((grid.n, 3))
+    np.add.at(alpha, faces.row, stress)
+    np.testing.assert_allclose(alpha, predict(TABLE_C3, 1.0, mu_surf, grid, counted), rtol=0, atol=1e-13)
+    aside = 1e-7 * np.random.default_rng(10).normal(size=60)
+    more, less = (law_and_slope(faces, rows, theta + s * aside, settings)[0] for s in (0.5, -0.5))
+    np.testing.assert_allclose(more - less, slope @ aside, rtol=0, atol=1e-13)
+
+
+def test_capped_data_are_fitted_as_capped(grid):
+    """A law whose friction mu_surf caps is fitted to 1 % where that is known, and otherwise to no better than 4 %."""
+    plates = measured(TABLE_C3, where_linear(TABLE_C3, grid), 0.3)
+    known, ignored = report(plates, Settings(), 0.3), report(plates, Settings(), ROUGH)
+    assert known.fitted.relative < 0.01
+    assert ignored.fitted.relative > 0.04
 
 
 # Few data -------------------------------------------------------------------------------------------------------------
