@@ -158,24 +158,24 @@ def _solve(plates: Plates, settings: Settings) -> Array:
     faces, measured = leading_faces(plates, settings.counted), plates.alpha.ravel()
     rows = design(faces.normal, faces.motion, settings.degree)
 
-    def law(theta: Array) -> tuple[float, Array, Array]:
+    def law(theta: Array) -> tuple[float, tuple[Array, Array]]:
         """The cost, and the linear problem for the next step."""
         own = theta[: settings.unknowns]
         stress, slope = law_and_slope(faces, rows, own, settings)
         alpha = _by_plate(faces, stress, plates.n).ravel()
         slope = _by_plate(faces, slope, plates.n).reshape(len(alpha), -1)
-        return _cost(alpha, theta, measured, settings), slope, measured - alpha + slope @ own
+        return _cost(alpha, theta, measured, settings), (slope, measured - alpha + slope @ own)
 
-    theta = _least(on_plates(faces, plates.n, settings.degree), measured, settings, None, 0.0)
+    free = dataclasses.replace(settings, dissipative=False)
+    theta = _least((on_plates(faces, plates.n, settings.degree), measured), free, None, 0.0)
     damping = 1e-3
-    for step in [dataclasses.replace(settings, dissipative=False)] + settings.dissipative * [settings]:
-        free = step is not settings
-        if not free:
-            theta = _least(*law(theta)[1:], step, theta, damping)
-        cost, *linear = law(theta)
-        for _ in range(_ROUNDS if free else _CONSTRAINED_ROUNDS):
-            trial = _least(*linear, step, theta, damping)
-            reached, *there = law(trial)
+    for step in (free, settings) if settings.dissipative else (free,):
+        if step.dissipative:
+            theta = _least(law(theta)[1], step, theta, damping)
+        cost, linear = law(theta)
+        for _ in range(_CONSTRAINED_ROUNDS if step.dissipative else _ROUNDS):
+            trial = _least(linear, step, theta, damping)
+            reached, there = law(trial)
             settled = abs(cost - reached) <= _SETTLED * cost
             if reached < cost:
                 theta, cost, linear, damping = trial, reached, there, max(0.2 * damping, 1e-9)
@@ -186,8 +186,9 @@ def _solve(plates: Plates, settings: Settings) -> Array:
     return theta[: settings.unknowns]
 
 
-def _least(rows: Array, rhs: Array, settings: Settings, near: Array | None, damping: float) -> Array:
+def _least(problem: tuple[Array, Array], settings: Settings, near: Array | None, damping: float) -> Array:
     """The x nearest to rows x = rhs under prior (whose scale is its last) and constraint, damped towards `near`."""
+    rows, rhs = problem
     a = _with_prior(rows, settings)
     b = np.append(rhs, np.zeros(len(a) - len(rhs)))
     if near is not None:
