@@ -24,9 +24,9 @@ from rftsim.tables import TABLE_C3, TABLE_C4, Term, columns, monomials
 
 SOURCE: Final = {3: TABLE_C3, 4: TABLE_C4}
 """The source's tables by degree."""
-_ROUNDS: Final = 40
-_CONSTRAINED_ROUNDS: Final = 6
-_SETTLED: Final = 1e-4
+_ROUNDS: Final = 12
+_CONSTRAINED_ROUNDS: Final = 4
+_SETTLED: Final = 1e-3
 
 
 @dataclasses.dataclass(frozen=True)

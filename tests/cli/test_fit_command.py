@@ -53,7 +53,7 @@ def campaign_folder(tmp_path_factory):
 def test_map_of_a_csv_is_a_law_and_a_sand(capsys, csv, tmp_path):
     """The file that `fit map` writes goes into --law and --sand; its law is near the one that made the plates."""
     out = tmp_path / "mine.toml"
-    given = ("--mu-surf", 0.4, "--rho-c", 3000, "-o", out, "--plot", tmp_path, "--json")
+    given = ("--mu-surf", 0.4, "--rho-c", 3000, "--prior", 0, "-o", out, "--plot", tmp_path, "--json")
     code, text, _ = call(capsys, "fit", "map", csv, *given)
     found = json.loads(text)
     assert code == 0
@@ -74,7 +74,7 @@ def test_map_of_a_csv_is_a_law_and_a_sand(capsys, csv, tmp_path):
 def test_map_of_a_campaign(capsys, campaign_folder):
     """The plates of the sand that has most; with the narrow faces counted, Table C.3 explains all of its own stress;
     every flat plate gives xi_n beside Table C.1; what is missing is said."""
-    code, text, _ = call(capsys, "fit", "map", campaign_folder, "--counted", "box", "--json")
+    code, text, _ = call(capsys, "fit", "map", campaign_folder, "--counted", "box", "--prior", 1, "--json")
     found = json.loads(text)
     assert code == 0
     assert found["plates"] == 75
@@ -83,10 +83,13 @@ def test_map_of_a_campaign(capsys, campaign_folder):
     assert found["error_of_the_source"] < 1e-6
     assert [(row["mu_int"], row["mu_surf"]) for row in found["flat"]][:2] == [(0.2, 0.2), (0.3, 0.2)]
     assert "1 of 78 plates" in found["warnings"][0]
-    without = json.loads(call(capsys, "fit", "map", campaign_folder, "--json")[1])
+    without = json.loads(call(capsys, "fit", "map", campaign_folder, "--prior", 1, "--json")[1])
     assert without["error"] > 2 * found["error"]
-    assert json.loads(call(capsys, "fit", "map", campaign_folder, "--counted", "face", "--json")[1])["error"] < 0.1
-    code, out, _ = call(capsys, "fit", "map", campaign_folder, "--counted", "box")
+    assert (
+        json.loads(call(capsys, "fit", "map", campaign_folder, "--counted", "face", "--prior", 1, "--json")[1])["error"]
+        < 0.1
+    )
+    code, out, _ = call(capsys, "fit", "map", campaign_folder, "--counted", "box", "--prior", 1)
     assert code == 0
     assert "held back" in out
     assert "Sand(rho_c=3000, mu_int=0.4" in out
@@ -98,7 +101,7 @@ def test_damaged_results_are_left_out_and_said(capsys, campaign_folder, tmp_path
     text = victim.read_text()
     victim.write_text(text.replace('"alpha_N_m3": [', '"alpha_N_m3": [1'))
     try:
-        found = json.loads(call(capsys, "fit", "map", campaign_folder, "--counted", "box", "--json")[1])
+        found = json.loads(call(capsys, "fit", "map", campaign_folder, "--counted", "box", "--prior", 1, "--json")[1])
     finally:
         victim.write_text(text)
     assert any("damaged" in warning and victim.stem in warning for warning in found["warnings"])
