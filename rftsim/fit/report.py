@@ -16,7 +16,7 @@ from rftsim.tables import Term
 
 FOLDS: Final = 10
 """Parts of the plates that are held back, one after another."""
-PRIORS: Final = (0.0, 1.0, 3.0, 10.0, 30.0, 100.0)
+PRIORS: Final = (0.0, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
 """Weights among which the prior is chosen [plates]."""
 
 
