@@ -69,10 +69,8 @@ def plot_trial(found: Found, title: str, path: Path) -> None:
     axis.plot(found.x[order], found.fitted[order], ".", color="C1", label="fitted")
     axis.set_xlabel(found.labels[0])
     axis.set_ylabel(found.labels[1])
-    axis.set_title(
-        ", ".join(f"{k} = {e.value:.3g} ({e.low:.3g} to {e.high:.3g})" for k, e in found.estimates.items()),
-        fontsize="small",
-    )
+    lines = [f"{name} = {one.value:.4g} ({one.low:.4g} to {one.high:.4g})" for name, one in found.estimates.items()]
+    axis.set_title("\n".join(lines), fontsize="small")
     axis.set_xlim(left=0.0)
     axis.set_ylim(bottom=0.0)
     axis.grid(alpha=0.3)
