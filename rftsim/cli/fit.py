@@ -16,7 +16,7 @@ from rftsim.errors import RftsimError
 from rftsim.fit import trials
 from rftsim.fit.generic import Settings
 from rftsim.fit.pictures import plot_map, plot_trial
-from rftsim.fit.plates import Campaign, Counted, Plates, read_campaign, read_csv
+from rftsim.fit.plates import Campaign, Plates, read_campaign, read_csv
 from rftsim.fit.report import FOLDS, Report, report
 from rftsim.law_file import law_text, toml
 from rftsim.sand import ALPHA_Z_PLATE, Sand, make_sand, read_parameters, xi_n_from_table
@@ -41,9 +41,6 @@ class Map:
     """Never add energy: alpha_gen . v <= 0 at every orientation and motion."""
     prior: float | None = None
     """As how many plates the source's table (C.3, C.4) counts; by default whichever predicts held-back plates best."""
-    counted: Counted = "plate"
-    """Which faces of a campaign's thick plates carry the force that is fitted: plate, the wide ones, all of it (as in
-    the source); box, the narrow ones, too; face, only the leading one, whose own force is taken."""
     rho_c: float | None = None
     """Density [kg/m^3]: which of a campaign's sands, or that of a CSV."""
     mu_int: float | None = None
@@ -63,7 +60,7 @@ class Map:
             raise RftsimError(f"prior must be zero or more plates, not {self.prior:g}")
         picture = _picture(self.plot, "fit-map.png")
         plates, sand, campaigns = self._read()
-        settings = Settings(self.degree, self.prior or 0.0, self.dissipative, self.counted)
+        settings = Settings(self.degree, self.prior or 0.0, self.dissipative)
         with Console(stderr=True).status("fitting"):
             found = report(plates, settings, sand["mu_surf"], choose_prior=self.prior is None)
         sand |= {"xi_n": float(f"{found.generic.xi_n:.8g}"), "source": f"rftsim fit map, {plates.n} plates"}
@@ -93,7 +90,7 @@ class Map:
         """The plates of all data, their one sand, and the campaigns."""
         named = {"rho": self.rho_c, "mu_int": self.mu_int, "mu_surf": self.mu_surf}
         wanted = {name: value for name, value in named.items() if value is not None}
-        campaigns = [read_campaign(path, wanted, self.counted) for path in self.data if path.is_dir()]
+        campaigns = [read_campaign(path, wanted) for path in self.data if path.is_dir()]
         tables = [read_csv(path) for path in self.data if not path.is_dir()]
         if not self.data:
             raise RftsimError("no data: name a campaign's folder or a CSV file")
@@ -104,8 +101,6 @@ class Map:
         if "mu_surf" not in sand:
             raise RftsimError("the friction between plate and sand is not known: pass --mu-surf")
         parts = [*(campaign.plates for campaign in campaigns), *tables]
-        if self.counted == "box" and tables:
-            raise RftsimError("--counted box needs the plates' thickness, which a CSV does not say")
         plates = Plates(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
         known = {"rho_c": sand.get("rho"), "mu_int": sand.get("mu_int"), "mu_surf": sand["mu_surf"]}
         return plates, {name: value for name, value in known.items() if value is not None}, campaigns
@@ -120,7 +115,6 @@ def _summary(found: Report, data: list[str]) -> dict[str, Any]:
         "normalisation": f"a flat plate pushed straight down has alpha_z = {ALPHA_Z_PLATE} xi_n, as in Table C.3",
         "prior_plates": found.settings.prior,
         "dissipative": found.settings.dissipative,
-        "counted": found.settings.counted,
         "coefficients": found.settings.unknowns,
         "determined": found.rank,
         "condition": float(f"{found.generic.condition:.4g}"),

@@ -16,7 +16,7 @@ import numpy as np
 
 from rftsim.errors import RftsimError
 from rftsim.fit.dissipation import dissipative
-from rftsim.fit.plates import Counted, Faces, Plates, leading_faces
+from rftsim.fit.plates import Faces, Plates, leading_faces
 from rftsim.fit.polynomials import terms
 from rftsim.sand import ALPHA_Z_PLATE
 from rftsim.surface import EDGE_ON_DOUBLE, Array
@@ -37,14 +37,12 @@ class Settings:
         degree: Of the polynomials: 3 (20 terms each) or 4 (35).
         prior: As how many plates over its reference grid the source's table of this degree counts, to scale.
         dissipative: Hold alpha_gen . v <= 0 at every orientation and motion, see `dissipation`.
-        counted: Which faces of a plate carry its force, see `plates.Counted`.
         mu_surf: Friction of the plates, for the law's cap.
     """
 
     degree: int = 3
     prior: float = 0.0
     dissipative: bool = False
-    counted: Counted = "plate"
     mu_surf: float = math.inf
 
     @property
@@ -79,7 +77,7 @@ def on_plates(faces: Faces, count: int, degree: int) -> Array:
     tangential part.
     """
     rows = design(faces.normal, faces.motion, degree)
-    cancel = faces.edge_on & faces.paired
+    cancel = faces.edge_on
     n = faces.normal[cancel]
     rows[cancel] -= n[:, :, None] * np.einsum("ki,kij->kj", n, rows[cancel])[:, None, :]
     return _by_plate(faces, faces.weight[:, None, None] * rows, count).reshape(3 * count, -1)
@@ -122,7 +120,7 @@ def fit(plates: Plates, settings: Settings) -> Generic:
 
 def determined(plates: Plates, settings: Settings) -> int:
     """How many coefficients plates determine without a prior."""
-    a = on_plates(leading_faces(plates, settings.counted), plates.n, settings.degree)
+    a = on_plates(leading_faces(plates), plates.n, settings.degree)
     return int(np.linalg.matrix_rank(a, tol=1e-9 * np.linalg.norm(a, 2)))
 
 
@@ -132,7 +130,7 @@ def nearest(plates: Plates, settings: Settings) -> Generic:
     Raises:
         RftsimError: The plates feel no force, or by their fit none that has a scale.
     """
-    a = on_plates(leading_faces(plates, settings.counted), plates.n, settings.degree)
+    a = on_plates(leading_faces(plates), plates.n, settings.degree)
     unit = float(np.sqrt((plates.alpha**2).sum(axis=1).mean()))
     if not unit > 0.0:
         raise RftsimError("the plates feel no force")
@@ -155,7 +153,7 @@ def _solve(plates: Plates, settings: Settings) -> Array:
     The law is not linear: it has |a_n| and the cap of eq. (5.6). A step counts where it brings the law nearer to the
     plates, and is damped where it does not.
     """
-    faces, measured = leading_faces(plates, settings.counted), plates.alpha.ravel()
+    faces, measured = leading_faces(plates), plates.alpha.ravel()
     rows = design(faces.normal, faces.motion, settings.degree)
 
     def law(theta: Array) -> tuple[float, tuple[Array, Array]]:

@@ -47,7 +47,7 @@ def _section(axis: Any, report: Report, k: int) -> None:
         own = in_plane & (angles[:, 0] == beta)
         like = [np.full(len(lines), column[own].mean()) for column in (report.plates.thickness, report.plates.depth)]
         made = Plates(lines, np.zeros_like(lines), *like)
-        law = predict(report.generic.table, xi_n, report.mu_surf, made, report.settings.counted)[:, k] / xi_n
+        law = predict(report.generic.table, xi_n, report.mu_surf, made)[:, k] / xi_n
         axis.plot(gamma, law, color=f"C{colour}", linewidth=1, label=f"$\\beta$ = {beta:g}°")
         axis.plot(angles[own, 1], report.plates.alpha[own, k] / xi_n, "o", color=f"C{colour}")
 

@@ -8,7 +8,7 @@ import hashlib
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Final, Literal, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -18,11 +18,6 @@ from rftsim.surface import EDGE_ON_DOUBLE, Array, Surface
 
 ANGLES: Final = ("beta", "gamma", "psi")
 ALPHA: Final = ("alpha_x", "alpha_y", "alpha_z")
-
-
-Counted = Literal["plate", "box", "face"]
-"""What alpha is the stress per depth of: a plate without thickness, on whose wide faces, as in the source, everything
-acts; a box, whose four narrow faces count, too; or the leading face alone, where its own force is known."""
 
 
 class Plates(NamedTuple):
@@ -70,8 +65,6 @@ class Faces(NamedTuple):
     """Direction of motion, (k, 3)."""
     weight: Array
     """Area and depth over those of the plate [-], (k,)."""
-    paired: bool
-    """Whether a plate that moves edge-on counts with both sides."""
 
     @property
     def edge_on(self) -> "np.ndarray[tuple[int], np.dtype[np.bool_]]":
@@ -90,29 +83,30 @@ def directions(angles: Array) -> tuple[Array, Array]:
     return m.round(15), v.round(15)  # cos 90 degrees is nothing
 
 
-def leading_faces(plates: Plates, counted: Counted = "plate") -> Faces:
-    """The faces that lead, n.v >= 0: of a plate that moves edge-on both, as the laws have it; alone, the lower one."""
+def leading_faces(plates: Plates) -> Faces:
+    """The faces that lead, n.v >= 0, narrow ones too: of a plate that moves edge-on, both wide ones, as in the laws.
+
+    The source takes plates for infinitely thin; with their edges counted, the law explains them better.
+    """
     m, v = directions(plates.angles)
     beta, psi = np.radians(plates.angles[:, 0]), np.radians(plates.angles[:, 2])
     across = np.stack([-np.sin(psi), np.cos(psi), np.zeros_like(psi)], axis=1)
     along = np.stack([np.cos(beta) * np.cos(psi), np.cos(beta) * np.sin(psi), np.sin(beta)], axis=1)
-    t, edges = plates.thickness[:, None], counted == "box"
+    t = plates.thickness[:, None]
     front = np.where((m * v).sum(axis=1, keepdims=True) >= -EDGE_ON_DOUBLE, m, -m)
     found = []
     for normal, reach, area in [(m, t / 2, 1.0), (-m, t / 2, 1.0)] + [
-        (side * axis, 0.5, t[:, 0]) for axis in (along, across) for side in (1.0, -1.0) if edges
+        (side * axis, 0.5, t[:, 0]) for axis in (along, across) for side in (1.0, -1.0)
     ]:
-        lower = ((front * t / 2 - normal * reach)[:, 2] if edges else 0.0) / plates.depth
+        lower = (front * t / 2 - normal * reach)[:, 2] / plates.depth
         found.append((normal.round(15), area * np.maximum(1.0 + lower, 0.0)))
-    if counted == "face":
-        return Faces(np.arange(plates.n), front, v, np.ones(plates.n), paired=False)
     row = np.tile(np.arange(plates.n), len(found))
     normal, weight = (
         np.concatenate([n for n, _ in found]),
         np.concatenate([w * np.ones(plates.n) for _, w in found]),
     )
     leads = ((normal * v[row]).sum(axis=1) >= -EDGE_ON_DOUBLE) & (weight > 0.0)
-    return Faces(row[leads], normal[leads], v[row][leads], weight[leads], paired=True)
+    return Faces(row[leads], normal[leads], v[row][leads], weight[leads])
 
 
 def at_unit_depth(normal: Array) -> Surface:
@@ -143,13 +137,12 @@ def read_csv(path: Path) -> Plates:
     return Plates(angles, np.stack([table[name] for name in ALPHA], axis=1), np.zeros(n), np.ones(n))
 
 
-def read_campaign(folder: Path, wanted: Mapping[str, float], counted: Counted = "plate") -> Campaign:
+def read_campaign(folder: Path, wanted: Mapping[str, float]) -> Campaign:
     """The square plates of a campaign's folder that share one sand: that of most plates, or the wanted one.
 
     Args:
         folder: With manifest.json and results/KEY.json, as `rftsim-mpm campaign` makes it.
         wanted: Any of rho, mu_int and mu_surf.
-        counted: What alpha is of.
 
     Raises:
         RftsimError: It is no campaign, or has no such plates.
@@ -176,7 +169,7 @@ def read_campaign(folder: Path, wanted: Mapping[str, float], counted: Counted = 
             notes.append(f"the plates differ in {name}: {', '.join(map(str, values))}")
     plates = Plates(
         np.array([[plate[name] for name in ANGLES] for plate in own], dtype=float),
-        np.array([_alpha(result, counted, folder) for result in sands[chosen]], dtype=float),
+        np.array([result["alpha_N_m3"] for result in sands[chosen]], dtype=float),
         np.array([(plate["thickness"] or 0.2 * plate["length"]) / plate["length"] for plate in own]),
         np.array([result["depth_m"] / result["plate"]["length"] for result in sands[chosen]]),
     )
@@ -188,14 +181,6 @@ def read_campaign(folder: Path, wanted: Mapping[str, float], counted: Counted = 
     ]
     sand = dict(zip(("rho", "mu_int", "mu_surf"), chosen, strict=True))
     return Campaign(plates, sand, sorted(flat, key=lambda row: (row["mu_int"], row["mu_surf"])), notes)
-
-
-def _alpha(result: dict[str, Any], counted: Counted, folder: Path) -> list[float]:
-    name = "alpha_face_N_m3" if counted == "face" else "alpha_N_m3"
-    if name not in result:
-        raise RftsimError(f"{folder} does not say the force on the leading face alone ({name}): count plate or box")
-    alpha: list[float] = result[name]
-    return alpha
 
 
 def _results(folder: Path) -> tuple[list[dict[str, Any]], list[str]]:

@@ -7,7 +7,7 @@ import numpy as np
 
 from rftsim.fit.dissipation import FINE_DEG, largest_power
 from rftsim.fit.generic import SOURCE, Generic, Settings, coefficients, determined, fit, nearest
-from rftsim.fit.plates import Counted, Plates, at_unit_depth, leading_faces
+from rftsim.fit.plates import Plates, at_unit_depth, leading_faces
 from rftsim.laws import fitted_law
 from rftsim.rigid import surface_force
 from rftsim.sand import Sand
@@ -131,7 +131,7 @@ def report(plates: Plates, settings: Settings, mu_surf: float, choose_prior: boo
         plates=plates,
         mu_surf=mu_surf,
         rank=rank,
-        predicted=predict(generic.table, generic.xi_n, mu_surf, plates, settings.counted),
+        predicted=predict(generic.table, generic.xi_n, mu_surf, plates),
         predicted_held_back=held_back(plates, settings),
         source=_of_source(plates, settings),
         power=largest_power(coefficients(generic.table), settings.degree, FINE_DEG)[0],
@@ -140,7 +140,7 @@ def report(plates: Plates, settings: Settings, mu_surf: float, choose_prior: boo
 
 def _of_source(plates: Plates, settings: Settings) -> Errors:
     table = SOURCE[settings.degree]
-    unit = predict(table, 1.0, settings.mu_surf, plates, settings.counted)
+    unit = predict(table, 1.0, settings.mu_surf, plates)
     xi_n = float((unit * plates.alpha).sum() / (unit**2).sum())
     return errors(xi_n * unit, plates, xi_n)
 
@@ -159,14 +159,14 @@ def held_back(plates: Plates, settings: Settings) -> Array:
     found = np.empty((count, 3))
     for k in range(part.max() + 1):
         generic, out = nearest(plates.take(part != k), settings), part == k
-        found[out] = predict(generic.table, generic.xi_n, settings.mu_surf, plates.take(out), settings.counted)
+        found[out] = predict(generic.table, generic.xi_n, settings.mu_surf, plates.take(out))
     return found
 
 
-def predict(table: tuple[Term, ...], xi_n: float, mu_surf: float, plates: Plates, counted: Counted) -> Array:
+def predict(table: tuple[Term, ...], xi_n: float, mu_surf: float, plates: Plates) -> Array:
     """Stress per depth of plates by the law with a table [N/m^3], (n, 3): that on every face that leads."""
     law, sand = fitted_law(table), Sand(xi_n=xi_n, mu_surf=min(mu_surf, 1e9))
-    faces = leading_faces(plates, counted)
+    faces = leading_faces(plates)
     alpha = np.zeros((plates.n, 3))
     motions, which = np.unique(faces.motion, axis=0, return_inverse=True)
     for k, motion in enumerate(motions):

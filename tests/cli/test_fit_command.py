@@ -24,7 +24,7 @@ XI_N = 0.8e6
 def csv(tmp_path_factory):
     """Plates of Table C.3 in a CSV."""
     plates = reference_grid().take(slice(None, None, 5))
-    alpha = predict(TABLE_C3, XI_N, 0.4, plates, "plate")
+    alpha = predict(TABLE_C3, XI_N, 0.4, plates)
     rows = [",".join(map(repr, row)) for row in np.hstack([plates.angles, alpha]).tolist()]
     path = tmp_path_factory.mktemp("plates") / "plates.csv"
     path.write_text("\n".join(["# angles in degrees", "beta,gamma,psi,alpha_x,alpha_y,alpha_z", *rows, ""]))
@@ -42,10 +42,8 @@ def campaign_folder(tmp_path_factory):
     campaign.begin(folder, [*plates, Plate(**common, mu_int=0.7)])
     for plate in plates:
         one = Plates(np.array([[plate.beta, plate.gamma, plate.psi]]), np.zeros((1, 3)), np.array([0.2]), np.ones(1))
-        alpha = predict(TABLE_C3, XI_N * (plate.mu_int / 0.4) ** 2, plate.mu_surf, one, "box")[0]
-        face = predict(TABLE_C3, XI_N, plate.mu_surf, one, "face")[0]
-        result = {"plate": dataclasses.asdict(plate), "depth_m": 0.1}
-        result |= {"alpha_N_m3": alpha.tolist(), "alpha_face_N_m3": face.tolist()}
+        alpha = predict(TABLE_C3, XI_N * (plate.mu_int / 0.4) ** 2, plate.mu_surf, one)[0]
+        result = {"plate": dataclasses.asdict(plate), "depth_m": 0.1, "alpha_N_m3": alpha.tolist()}
         campaign.write(folder, campaign.key(plate), {**result, "sha256": campaign._checksum(result)})
     return folder
 
@@ -72,9 +70,9 @@ def test_map_of_a_csv_is_a_law_and_a_sand(capsys, csv, tmp_path):
 
 
 def test_map_of_a_campaign(capsys, campaign_folder):
-    """The plates of the sand that has most; with the narrow faces counted, Table C.3 explains all of its own stress;
+    """The plates of the sand that has most; Table C.3 explains all of its own stress;
     every flat plate gives xi_n beside Table C.1; what is missing is said."""
-    code, text, _ = call(capsys, "fit", "map", campaign_folder, "--counted", "box", "--prior", 1, "--json")
+    code, text, _ = call(capsys, "fit", "map", campaign_folder, "--prior", 1, "--json")
     found = json.loads(text)
     assert code == 0
     assert found["plates"] == 75
@@ -83,13 +81,7 @@ def test_map_of_a_campaign(capsys, campaign_folder):
     assert found["error_of_the_source"] < 1e-6
     assert [(row["mu_int"], row["mu_surf"]) for row in found["flat"]][:2] == [(0.2, 0.2), (0.3, 0.2)]
     assert "1 of 78 plates" in found["warnings"][0]
-    without = json.loads(call(capsys, "fit", "map", campaign_folder, "--prior", 1, "--json")[1])
-    assert without["error"] > 2 * found["error"]
-    assert (
-        json.loads(call(capsys, "fit", "map", campaign_folder, "--counted", "face", "--prior", 1, "--json")[1])["error"]
-        < 0.1
-    )
-    code, out, _ = call(capsys, "fit", "map", campaign_folder, "--counted", "box", "--prior", 1)
+    code, out, _ = call(capsys, "fit", "map", campaign_folder, "--prior", 1)
     assert code == 0
     assert "held back" in out
     assert "Sand(rho_c=3000, mu_int=0.4" in out
@@ -101,7 +93,7 @@ def test_damaged_results_are_left_out_and_said(capsys, campaign_folder, tmp_path
     text = victim.read_text()
     victim.write_text(text.replace('"alpha_N_m3": [', '"alpha_N_m3": [1'))
     try:
-        found = json.loads(call(capsys, "fit", "map", campaign_folder, "--counted", "box", "--prior", 1, "--json")[1])
+        found = json.loads(call(capsys, "fit", "map", campaign_folder, "--prior", 1, "--json")[1])
     finally:
         victim.write_text(text)
     assert any("damaged" in warning and victim.stem in warning for warning in found["warnings"])
@@ -125,7 +117,6 @@ HEAD = "beta,gamma,psi,alpha_x,alpha_y,alpha_z\n"
         (HEAD + "0,90,0,0,0,0\n", ("--prior", "1"), "feel no force"),
         (HEAD + "0,90,0,0,0,-1e6\n", ("--prior", "1"), "check the signs of alpha"),
         (HEAD + "0,90,0,0,0,1e6\n", ("--prior", "-1"), "zero or more"),
-        (HEAD + "0,90,0,0,0,1e6\n", ("--counted", "box", "--prior", "1"), "does not say"),
         (HEAD + "0,90,0,0,0,1e6\n", ("-o", "law.txt"), "must end in .toml"),
     ],
 )
