@@ -100,3 +100,23 @@ def tractions(sand: Array, body: Array, xpos: Any, xmat: Any, velocity: Any, ome
     stress, depth = np.empty((ntri, 3)), np.empty(ntri)
     _FUNCTIONS["rftsim_tractions"].ctypes(*(array.ctypes.data for array in (*arrays, stress, depth)))
     return stress, depth
+
+
+def wrenches(sand: Array, body: Array, xpos: Array, xmat: Array, velocity: Array, omega: Array) -> Array:
+    """Force [N] and moment about the body's origin [N m], world frame, (n, 6).
+
+    Args:
+        sand: Packed sand.
+        body: Packed surface.
+        xpos: Positions of the body's origin [m], (n, 3).
+        xmat: Rotations to the world frame, (n, 3, 3).
+        velocity: Velocities of the body's origin [m/s], (n, 3).
+        omega: Angular velocities, world frame [rad/s], (n, 3).
+    """
+    out = np.empty((len(xpos), 6))
+    arrays = [*(np.ascontiguousarray(x, dtype=float) for x in (xpos, xmat, velocity, omega)), out]
+    rows = zip(*(range(a.ctypes.data, a.ctypes.data + a.nbytes, a.strides[0]) for a in arrays), strict=True)
+    fixed = sand.ctypes.data, body.ctypes.data
+    for row in rows:
+        _FUNCTIONS["rftsim_wrench"].ctypes(*fixed, *row)
+    return out

@@ -64,7 +64,7 @@ def pack_sand(sand: Sand, law: Law, free_surface: FreeSurface, plane: ArrayLike)
 
 def pack_surface(surface: Surface) -> Array:
     """A surface as numbers: a header of HEADER, then COLUMNS columns of ntri."""
-    points = surface.triangles.reshape(-1, 3)
+    points = np.concatenate([surface.corners, surface.centres])
     header = np.zeros(HEADER)
     header[0] = surface.edge_on
     header[1:4], header[4:7] = points.min(axis=0), points.max(axis=0)

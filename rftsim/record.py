@@ -228,7 +228,7 @@ def _make_skin(model: mujoco.MjModel, start: mujoco.MjData, body: int) -> _Skin:
     for collision_only in (True, False):
         drawn = body_surface(model, body, collision_only=collision_only, max_edge=None, allow_open=True)
         geoms = [geom for geom in own if is_colliding(model, geom) or not collision_only]
-        if drawn is not None and np.isclose(drawn.areas.sum(), area):
+        if drawn is not None and np.isclose(drawn.areas.sum(), area, rtol=0.05):  # facets have a little less
             break
     assert drawn is not None, "a body that feels sand has geoms"
     rotation = start.xmat[body].reshape(3, 3)

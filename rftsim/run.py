@@ -96,7 +96,7 @@ def steps(staged: Staged) -> Generator[mujoco.MjData, None, Run]:
         mujoco.mj_resetDataKeyframe(model, data, 0)
     mujoco.mj_forward(model, data)
     body = model.body(measured.body).id
-    corners = bed.surfaces[measured.body].triangles.reshape(-1, 3)
+    corners = bed.surfaces[measured.body].corners
     total = max(round(staged.duration / model.opt.timestep), 1)
     every = max(total // SAMPLES, 1)
     rows: list[tuple[Any, ...]] = []

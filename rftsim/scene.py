@@ -12,12 +12,14 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rftsim import packed
+from rftsim import economy, packed
+from rftsim.economy import Economy
 from rftsim.engine import instance as engine
 from rftsim.engine import plugin
 from rftsim.errors import RftsimWarning, SceneError
 from rftsim.geometry import body_surface, is_colliding
 from rftsim.laws import Law, get_law
+from rftsim.reach import clearance, sampled_reach, stays_in_plane
 from rftsim.sand import FreeSurface, Sand, make_sand
 from rftsim.surface import Array, Surface, Wheel
 
@@ -39,6 +41,8 @@ class Bed(NamedTuple):
     """Why each body of the model does or does not feel it, by body name."""
     notes: tuple[str, ...]
     """What was found doubtful or repaired."""
+    economies: dict[str, Economy]
+    """What the surfaces were reduced to, by body name; empty without a tolerance."""
 
 
 def add_sand(
@@ -51,6 +55,7 @@ def add_sand(
     plane: ArrayLike = (0.0, 1.0, 0.0),
     geoms: Literal["collision", "all"] = "collision",
     max_edge: float | None = None,
+    tolerance: float | None = None,
     wheels: "Mapping[str, Wheel] | Iterable[str] | str" = (),
     disable_floor: bool = False,
     allow_open: bool = False,
@@ -73,6 +78,10 @@ def add_sand(
         plane: Normal of the vertical plane of motion, for the 2D laws.
         geoms: Which geoms bound a body: those that can collide, or all.
         max_edge: Longest edge of a triangle [m]; by default a sixth of each geom's size.
+        tolerance: Model only what the scene needs: the fewest elements whose wrench is that of all triangles within
+            this share (see `rftsim.economy`), in the poses and motions that the joints allow, and none of bodies that
+            cannot reach the sand unless they are named in `bodies`. It holds for this sand, law and tree; so a model
+            that is attached to another, or whose sand is tilted later, needs none (None).
         wheels: Driven wheels, behind which the dynamic laws let the free surface drop: names, whose axis is then that
             of their hinge and whose radius that of their surface; or `Wheel` by name.
         disable_floor: Take collision from planes at the sand's level, which would support the bodies a second time.
@@ -95,6 +104,8 @@ def add_sand(
         raise SceneError(f"geoms must be 'collision' or 'all', not {geoms!r}")
     if max_edge is not None and not max_edge > 0.0:
         raise SceneError(f"max_edge must be positive, not {max_edge:g}")
+    if tolerance is not None and not 0.0 < tolerance < 1.0:
+        raise SceneError(f"tolerance must lie between 0 and 1, as 0.01 does, not {tolerance:g}")
     bodies = [bodies] if isinstance(bodies, str) else bodies
     wheels = [wheels] if isinstance(wheels, str) else wheels
     plugin_name = plugin.IMPLICIT if force == "implicit" else plugin.EXPLICIT
@@ -109,10 +120,12 @@ def add_sand(
     model = draft.compile()
     _check_options(model, bed_sand)
     plane_normal = numbers[7:10] if bed_law.planar else None
-    surfaces, reasons = _surfaces(model, bodies, geoms == "collision", max_edge, allow_open, plane_normal)
+    within = free_surface if tolerance is not None and bodies is None else None
+    surfaces, reasons = _surfaces(model, bodies, geoms == "collision", max_edge, allow_open, plane_normal, within)
     rolling = _with_wheels(model, surfaces, wheels)
     if bed_law.dynamic:
         surfaces |= rolling
+    economies = {} if tolerance is None else _reduce(model, surfaces, reasons, numbers, tolerance)
     notes = [note for one in surfaces.values() for note in one.notes]
     floors = _floors(model, surfaces, free_surface)
     _check_names(spec, name, surfaces, sensors, draw)
@@ -133,7 +146,7 @@ def add_sand(
         _draw(spec, name, free_surface)
     for note in notes:
         warnings.warn(note, RftsimWarning, stacklevel=2)
-    return Bed(name, bed_sand, bed_law, free_surface, surfaces, reasons, tuple(notes))
+    return Bed(name, bed_sand, bed_law, free_surface, surfaces, reasons, tuple(notes), economies)
 
 
 def load(
@@ -170,6 +183,30 @@ def read_spec(source: "str | Path") -> mujoco.MjSpec:
     if not Path(source).is_file():
         raise SceneError(f"no model file {source}")
     return mujoco.MjSpec.from_file(str(source))
+
+
+CLEAR = 0.1
+"""Height over the sand, over the body's size, from which on a body counts as out of reach."""
+
+
+def _reduce(
+    model: mujoco.MjModel, surfaces: dict[str, Surface], reasons: dict[str, str], numbers: Array, tolerance: float
+) -> dict[str, Economy]:
+    """Replace surfaces by the fewest elements that keep the tolerance, and say so in the reasons."""
+    economies = {}
+    for name, surface in surfaces.items():
+        body = model.body(name).id
+        reaches = (sampled_reach(model, body, surface, economy.POSES, seed) for seed in (0, 1))
+        surfaces[name], found = economy.reduced(surface, numbers, tolerance, *reaches)
+        economies[name] = found
+        if found.elements < found.triangles:
+            said = f"{found.elements} elements keep its wrench within {100 * found.error:.2g} %"
+        elif found.triangles <= packed.BLOCK:
+            said = f"up to {packed.BLOCK} triangles cost the same"
+        else:
+            said = f"fewer elements would err by more than {100 * tolerance:g} %"
+        reasons[name] += f"; {said}"
+    return economies
 
 
 _TEMPORARY = "rftsim-geom:"
@@ -229,7 +266,9 @@ def _surfaces(
     max_edge: float | None,
     allow_open: bool,
     plane: Array | None,
+    within: FreeSurface | None,
 ) -> tuple[dict[str, Surface], dict[str, str]]:
+    """Surfaces by body name, and reasons; bodies that cannot reach the free surface `within`, if given, have none."""
     names = [model.body(i).name for i in range(model.nbody)]
     chosen = None if bodies is None else set(bodies)
     for unknown in sorted((chosen or set()) - set(names)):
@@ -253,6 +292,8 @@ def _surfaces(
             found = body_surface(model, i, collision_only=collision_only, max_edge=max_edge, allow_open=allow_open)
             if found is None:
                 reasons[name] = "has no geom that collides" if model.body_geomnum[i] else "has no geom"
+            elif within is not None and (above := clearance(model, i, found, within)) > CLEAR * found.size:
+                reasons[name] = f"stays {above:.3g} m or more above the sand, by its tree and its joints' ranges"
             else:
                 felt, reasons[name] = _felt(model, i, found, plane)
                 surfaces[name] = felt.clustered(packed.BLOCK)
@@ -275,7 +316,7 @@ def _felt(model: mujoco.MjModel, body: int, surface: Surface, plane: Array | Non
     plane they never will.
     """
     everything = f"moves, {surface.ntri} triangles"
-    if plane is None or not _stays_in_plane(model, body, plane):
+    if plane is None or not stays_in_plane(model, body, plane):
         return surface, everything
     carries = np.abs(surface.normals @ plane) < 1.0 - 1e-6
     if carries.all() or not carries.any():
@@ -284,22 +325,6 @@ def _felt(model: mujoco.MjModel, body: int, surface: Surface, plane: Array | Non
         dataclasses.replace(surface, triangles=surface.triangles[carries]),
         f"moves in the plane; {np.count_nonzero(~carries)} of {surface.ntri} triangles are parallel to it and left out",
     )
-
-
-def _stays_in_plane(model: mujoco.MjModel, body: int, plane: Array) -> bool:
-    """Whether every joint above a body is a slide or a hinge about the plane's normal, from an upright rest pose."""
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    if not np.allclose(data.xmat[body].reshape(3, 3) @ plane, plane, atol=1e-9):
-        return False
-    while body != 0:
-        for joint in range(model.body_jntadr[body], model.body_jntadr[body] + model.body_jntnum[body]):
-            kind = mujoco.mjtJoint(model.jnt_type[joint])
-            about = abs(data.xaxis[joint] @ plane) > 1.0 - 1e-9
-            if kind != mujoco.mjtJoint.mjJNT_SLIDE and not (kind == mujoco.mjtJoint.mjJNT_HINGE and about):
-                return False
-        body = model.body_parentid[body]
-    return True
 
 
 def _with_wheels(
@@ -319,7 +344,7 @@ def _hinged_wheel(model: mujoco.MjModel, name: str, surface: Surface) -> Wheel:
     for joint in range(body.jntadr[0], body.jntadr[0] + body.jntnum[0]):
         if model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE:
             axis, centre = model.jnt_axis[joint], model.jnt_pos[joint]
-            reach = surface.triangles.reshape(-1, 3) - centre
+            reach = surface.corners - centre
             radius = float(np.linalg.norm(reach - np.outer(reach @ axis, axis), axis=1).max())
             return Wheel(tuple(axis.tolist()), tuple(centre.tolist()), radius)
     raise SceneError(f"wheel {name!r} has no hinge to turn about: give its Wheel(axis, centre, radius)")

@@ -51,12 +51,14 @@ class Surface:
         edge_on: Leading-edge tolerance: n.v_hat down to minus this counts as leading.
         wheel: Set where the body is a wheel to the structural term.
         notes: What was found and repaired, one sentence each.
+        outline: Where the triangles stand for others, corners of those [m], shape (npoint, 3).
     """
 
     triangles: Array
     edge_on: float = EDGE_ON_DOUBLE
     wheel: Wheel | None = None
     notes: tuple[str, ...] = ()
+    outline: Array | None = None
     centres: Array = dataclasses.field(init=False)
     """Centroids [m], shape (ntri, 3)."""
     normals: Array = dataclasses.field(init=False)
@@ -78,10 +80,14 @@ class Surface:
         return len(self.areas)
 
     @property
+    def corners(self) -> Array:
+        """Points that span the body [m], shape (npoint, 3)."""
+        return self.triangles.reshape(-1, 3) if self.outline is None else self.outline
+
+    @property
     def size(self) -> float:
         """Largest extent along an axis [m]."""
-        points = self.triangles.reshape(-1, 3)
-        return float(np.ptp(points, axis=0).max())
+        return float(np.ptp(self.corners, axis=0).max())
 
     def moved(self, rotation: ArrayLike, translation: ArrayLike) -> "Surface":
         """The surface after x -> rotation x + translation."""
@@ -89,7 +95,8 @@ class Surface:
         wheel = self.wheel
         if wheel is not None:
             wheel = Wheel(tuple((r @ wheel.axis).tolist()), tuple((r @ wheel.centre + t).tolist()), wheel.radius)
-        return dataclasses.replace(self, triangles=self.triangles @ r.T + t, wheel=wheel)
+        outline = None if self.outline is None else self.outline @ r.T + t
+        return dataclasses.replace(self, triangles=self.triangles @ r.T + t, wheel=wheel, outline=outline)
 
     def clustered(self, size: int) -> "Surface":
         """The surface with its triangles in an order where each `size` of them lie close together."""

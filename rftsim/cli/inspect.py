@@ -8,17 +8,20 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
+from rftsim.advice import advise
 from rftsim.cli.output import print_json
-from rftsim.scenes import stage
+from rftsim.errors import RftsimError
+from rftsim.scene import Bed
+from rftsim.scenes import Staged, stage
 
 Settings = Annotated[tuple[tuple[str, ...], ...], tyro.conf.UseAppendAction]
 
 
 @dataclasses.dataclass(frozen=True)
 class Inspect:
-    """What would be modelled of a scene: bodies, triangles, law, sand, and why.
+    """What would be modelled of a scene: bodies, triangles, law, sand, and why; and what of it the scene needs.
 
-    Example: rftsim inspect robot.xml --sand poppy-seeds
+    Example: rftsim inspect robot.xml --sand poppy-seeds --tolerance 0.01
     """
 
     scene: tyro.conf.Positional[str]
@@ -29,6 +32,10 @@ class Inspect:
     """Instead of the scene's sand: a preset, key=value,... or a TOML file."""
     set: Settings = ()
     """Settings of a shipped scene, key=value ...; may be repeated."""
+    tolerance: float = 0.01
+    """Largest error of a body's wrench, from which follows how many elements it needs."""
+    speed: float | None = None
+    """Speed that decides on the law [m/s]; by default that of the fastest body at the start."""
     disable_floor: bool = False
     """Take collision from planes at the sand's level."""
     allow_open: bool = False
@@ -37,26 +44,13 @@ class Inspect:
     """Print JSON."""
 
     def __call__(self, warnings: Callable[[], list[str]]) -> None:
-        """Stage the scene and print."""
-        staged = stage(
-            self.scene,
-            sand=self.sand,
-            law=self.law,
-            settings=settings(self.set),
-            disable_floor=self.disable_floor,
-            allow_open=self.allow_open,
-        )
-        bed, model = staged.bed, staged.model
-        bodies: dict[str, dict[str, Any]] = {
-            name: {
-                "feels_sand": name in bed.surfaces,
-                "triangles": bed.surfaces[name].ntri if name in bed.surfaces else 0,
-                "area_m2": float(bed.surfaces[name].areas.sum()) if name in bed.surfaces else 0.0,
-                "wheel": name in bed.surfaces and bed.surfaces[name].wheel is not None,
-                "why": why,
-            }
-            for name, why in bed.reasons.items()
-        }
+        """Stage the scene, whole and reduced, and print."""
+        if self.speed is not None and not self.speed >= 0.0:
+            raise RftsimError(f"the speed must be zero or more, not {self.speed:g} m/s")
+        whole, lean = self._stage(None), self._stage(self.tolerance)
+        bed = whole.bed
+        advice = advise(lean.model, lean.bed, self.speed)
+        bodies = {name: _body(bed, lean.bed, name) for name in bed.reasons}
         if self.json:
             print_json(
                 {
@@ -65,9 +59,12 @@ class Inspect:
                     "law_says": bed.law.says,
                     "sand": dataclasses.asdict(bed.sand),
                     "surface": dataclasses.asdict(bed.free_surface),
-                    "timestep_s": float(model.opt.timestep),
+                    "timestep_s": float(whole.model.opt.timestep),
                     "bodies": bodies,
                     "triangles": sum(surface.ntri for surface in bed.surfaces.values()),
+                    "tolerance": self.tolerance,
+                    "elements": sum(surface.ntri for surface in lean.bed.surfaces.values()),
+                    "advice": [one._asdict() for one in advice],
                     "warnings": warnings(),
                 }
             )
@@ -76,12 +73,50 @@ class Inspect:
         console.print(f"[bold]{self.scene}[/bold]  law {bed.law.name}: {bed.law.says}", highlight=False)
         given = {k: v for k, v in dataclasses.asdict(bed.sand).items() if v not in (None, "")}
         console.print("sand  " + ", ".join(f"{k} {v:g}" if k != "source" else v for k, v in given.items()))
-        table = Table("body", "triangles", "area [m^2]", "wheel", "why")
+        console.print(_table(bodies, self.tolerance))
         for name, row in bodies.items():
-            table.add_row(
-                name, str(row["triangles"]), f"{row['area_m2']:.4g}", "yes" if row["wheel"] else "", row["why"]
-            )
-        console.print(table)
+            console.print(f"{name}: {row['why']}", highlight=False, soft_wrap=True)
+        for one in advice:
+            change = "keep" if one.law == bed.law.name else f"--law {one.law}, not"
+            console.print(f"law: {change} {bed.law.name}: {one.reason}", highlight=False, soft_wrap=True)
+
+    def _stage(self, tolerance: float | None) -> Staged:
+        return stage(
+            self.scene,
+            sand=self.sand,
+            law=self.law,
+            settings=settings(self.set),
+            tolerance=tolerance,
+            disable_floor=self.disable_floor,
+            allow_open=self.allow_open,
+        )
+
+
+def _body(whole: Bed, lean: Bed, name: str) -> dict[str, Any]:
+    surface = whole.surfaces.get(name)
+    economy = lean.economies.get(name)
+    return {
+        "feels_sand": surface is not None,
+        "triangles": surface.ntri if surface else 0,
+        "area_m2": float(surface.areas.sum()) if surface else 0.0,
+        "wheel": surface is not None and surface.wheel is not None,
+        "needed": lean.surfaces[name].ntri if name in lean.surfaces else 0,
+        "error": economy.error if economy else None,
+        "error_held_back": economy.held_back if economy else None,
+        "why": lean.reasons[name],
+    }
+
+
+def _table(bodies: dict[str, dict[str, Any]], tolerance: float) -> Table:
+    table = Table("body", caption=f"needed: what --tolerance {tolerance:g} models; errors of its wrench in %")
+    for heading in ("triangles", "needed", "error", "held back", "area [m^2]"):
+        table.add_column(heading, justify="right")
+    table.add_column("wheel")
+    for name, row in bodies.items():
+        errors = [f"{100 * row[key]:.2f}" if row[key] is not None else "" for key in ("error", "error_held_back")]
+        counts = str(row["triangles"]), str(row["needed"])
+        table.add_row(name, *counts, *errors, f"{row['area_m2']:.4g}", "yes" if row["wheel"] else "")
+    return table
 
 
 def settings(groups: Settings) -> dict[str, str]:

@@ -37,6 +37,8 @@ class Run:
     """Settings of a shipped scene, key=value ...; may be repeated."""
     force: Literal["implicit", "explicit"] = "implicit"
     """The sand's force: at the end of each step, or at the velocity of the moment, which needs short steps."""
+    tolerance: float | None = None
+    """Model only what the scene needs: the fewest elements whose wrench errs by at most this share, as 0.01."""
     duration: float | None = None
     """Simulated time [s]."""
     timestep: float | None = None
@@ -70,6 +72,7 @@ class Run:
             timestep=self.timestep,
             duration=self.duration,
             force=self.force,
+            tolerance=self.tolerance,
             disable_floor=self.disable_floor,
             allow_open=self.allow_open,
         )
