@@ -10,13 +10,14 @@ held against other poses, depths and motions, too, where twice the tolerance is 
 """
 
 import math
+from collections.abc import Callable
 from typing import Final, NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from rftsim import native, packed
-from rftsim.facets import Labels, bisections, clusters, features, merged
+from rftsim.facets import Labels, features, merged, settled, split
 from rftsim.packed import BLOCK
 from rftsim.surface import Array, Surface
 
@@ -30,6 +31,15 @@ POSES: Final = 16
 """Orientations of a body."""
 MOTIONS: Final = 18
 """Motions at each orientation and depth."""
+
+GROWTH: Final = 1.2
+"""Facets of the next attempt over those of the last."""
+STEERING: Final = 400
+"""Samples that are drawn anew for each attempt, to see where facets err."""
+WORST: Final = 64
+"""Those of them, the worst, that decide which facets are split."""
+ASIDE: Final = 0.05
+"""How far motions lie from the axes: exactly along them the law of a body with symmetries may jump."""
 
 
 class Reach(NamedTuple):
@@ -70,10 +80,10 @@ class Economy(NamedTuple):
     """Largest over the poses, depths and motions that it is checked at."""
 
 
-def free_reach(count: int, seed: int) -> Reach:
+def free_reach(seed: int) -> Reach:
     """Any orientation and any motion."""
-    rotations = Rotation.random(count, random_state=np.random.default_rng(seed)).as_matrix()
-    return Reach(rotations, np.broadcast_to(np.eye(6), (count, 6, 6)))
+    rotations = Rotation.random(POSES, random_state=np.random.default_rng(seed)).as_matrix()
+    return Reach(rotations, np.broadcast_to(np.eye(6), (POSES, 6, 6)))
 
 
 def middle(surface: Surface) -> Array:
@@ -85,8 +95,8 @@ def middle(surface: Surface) -> Array:
 def draw(surface: Surface, sand: Array, reach: Reach, depths: tuple[float, ...], seed: int) -> Samples:
     """Each orientation at each depth with MOTIONS motions.
 
-    Translations and rotations about the body's centre along the three axes, both ways, as far as the joints allow, and
-    as many drawn at random; at speeds of 0.1 to 1 sqrt(g L), which only the dynamic laws notice.
+    Near the translations along the three axes and the rotations about them, both ways, and others drawn at random, as
+    far as the joints allow; at speeds of 0.1 to 1 sqrt(g L), which only the dynamic laws notice.
 
     Args:
         surface: The body's.
@@ -102,7 +112,8 @@ def draw(surface: Surface, sand: Array, reach: Reach, depths: tuple[float, ...],
         lowest = float((surface.corners @ rotation.T @ up).min())
         for depth in depths:
             position = (sand[6] - lowest - depth * size) * up
-            wanted = np.vstack([np.eye(6), -np.eye(6), rng.normal(size=(MOTIONS - 12, 6))])
+            axes = np.vstack([np.eye(6), -np.eye(6)]) + rng.normal(scale=ASIDE, size=(12, 6))
+            wanted = np.vstack([axes, rng.normal(size=(MOTIONS - 12, 6))])
             for motion in wanted / np.linalg.norm(wanted, axis=1, keepdims=True) @ allowed.T:
                 length = np.linalg.norm(motion)
                 if length < 0.1:  # what is left of a motion that the joints forbid
@@ -124,48 +135,75 @@ def wrenches(surface: Surface, sand: Array, samples: Samples) -> Array:
 
 def errors(whole: Array, reduced: Array, depth: Array) -> Array:
     """Error at each sample, (n,); see above."""
-
-    def larger(wrench: Array) -> Array:
-        sides: Array = np.linalg.norm(wrench.reshape(-1, 2, 3), axis=2).max(axis=1)
-        return sides
-
-    scale = {d: larger(whole[depth == max(d, SHALLOW)]).max() for d in np.unique(depth)}
-    return larger(whole - reduced) / np.maximum([scale[d] for d in depth], 1e-300)
+    return _larger(whole - reduced) / _scales(whole, depth)
 
 
-def reduced(surface: Surface, sand: Array, tolerance: float, reach: Reach, other: Reach) -> tuple[Surface, Economy]:
-    """The surface in the fewest blocks of facets that keep the error under a tolerance; itself where none do.
+def _larger(wrench: Array) -> Array:
+    sides: Array = np.linalg.norm(wrench.reshape(-1, 2, 3), axis=2).max(axis=1)
+    return sides
+
+
+def _scales(whole: Array, depth: Array) -> Array:
+    """What the error at each sample is measured by [N], (n,)."""
+    scale = {d: _larger(whole[depth == max(d, SHALLOW)]).max() for d in np.unique(depth)}
+    found: Array = np.maximum([scale[d] for d in depth], 1e-300)
+    return found
+
+
+def reduced(
+    surface: Surface, sand: Array, tolerance: float, reach: Callable[[int], Reach] = free_reach
+) -> tuple[Surface, Economy]:
+    """The surface in the fewest facets found that keep the error under a tolerance; itself where none do.
+
+    From a few facets on, those are split whose own force errs most in poses and motions that are drawn anew for each
+    attempt. So neither those that decide nor those held back have been seen.
 
     Args:
         surface: A body's.
         sand: Packed; its law is the one that is kept.
         tolerance: Largest error.
-        reach: Orientations and motions that are sampled.
-        other: Those that what passed is checked at.
+        reach: Orientations and motions of the body, by a seed.
     """
     surface = surface.clustered(BLOCK)
-    samples, checks = draw(surface, sand, reach, DEPTHS, 0), draw(surface, sand, other, HELD_BACK, 1)
+    areas = surface.areas
+    samples, checks = draw(surface, sand, reach(0), DEPTHS, 0), draw(surface, sand, reach(1), HELD_BACK, 1)
     whole, checked = wrenches(surface, sand, samples), wrenches(surface, sand, checks)
-    points, cuts = features(surface, _nearness(samples, sand[3:6])), list[Labels]()
-
-    def attempt(blocks: int) -> tuple[Surface, float, float]:
-        nonlocal cuts
-        if len(cuts) < blocks * BLOCK:
-            cuts = bisections(points, surface.areas, 2 * blocks * BLOCK)
-        facets = merged(surface, clusters(points, surface.areas, cuts, blocks * BLOCK)).clustered(BLOCK)
+    points = features(surface, _nearness(samples, sand[3:6]))
+    labels: Labels = np.zeros(surface.ntri, dtype=np.intp)
+    blocks, attempt = 0.5, 2
+    while blocks * BLOCK < surface.ntri - BLOCK:
+        while (lacking := int(blocks * BLOCK) - (int(labels.max()) + 1)) > 0:
+            facets = merged(surface, labels)
+            drawn = draw(surface, sand, reach(attempt), DEPTHS, attempt)
+            some = np.random.default_rng(attempt).permutation(len(drawn.depth))[:STEERING]
+            share = _shares(surface, facets, labels, sand, Samples(*(x[some] for x in drawn)))
+            grown = split(labels, np.argsort(-share)[:lacking], points, areas)
+            attempt += 1
+            if grown.max() == labels.max():
+                return surface, Economy(surface.ntri, surface.ntri, 0.0, 0.0)
+            labels = grown
+        labels = settled(labels, points, areas)
+        facets = merged(surface, labels)
         error = errors(whole, wrenches(facets, sand, samples), samples.depth).max()
-        held_back = errors(checked, wrenches(facets, sand, checks), checks.depth).max()
-        return facets, float(error), float(held_back)
+        if error <= tolerance:
+            held_back = errors(checked, wrenches(facets, sand, checks), checks.depth).max()
+            if held_back <= 2 * tolerance:
+                return facets.clustered(BLOCK), Economy(surface.ntri, facets.ntri, float(error), float(held_back))
+        blocks = max(2 * blocks, 1) if blocks < 2 else int(GROWTH * blocks) + 1
+    return surface, Economy(surface.ntri, surface.ntri, 0.0, 0.0)
 
-    failed, passed, best = 0, -(-surface.ntri // BLOCK), (surface, 0.0, 0.0)
-    while passed - failed > 1:
-        blocks = min(max(2 * failed, 1), (failed + passed) // 2)
-        found = attempt(blocks)
-        if found[1] <= tolerance and found[2] <= 2 * tolerance:
-            passed, best = blocks, found
-        else:
-            failed = blocks
-    return best[0], Economy(surface.ntri, best[0].ntri, *best[1:])
+
+def _shares(surface: Surface, facets: Surface, labels: Labels, sand: Array, samples: Samples) -> Array:
+    """Each facet's part in the error of the wrench, (nfacet,): squares of the errors of its own force, summed."""
+    bodies = packed.pack_surface(surface), packed.pack_surface(facets)
+    whole, reduced = (wrenches(body, sand, samples) for body in (surface, facets))
+    scale = _scales(whole, samples.depth)
+    share = np.zeros(facets.ntri)
+    for sample in np.argsort(-_larger(whole - reduced) / scale)[:WORST]:
+        fine, coarse = (native.tractions(sand, body, *(x[sample] for x in samples[1:]))[0] for body in bodies)
+        force = [np.bincount(labels, column) for column in (fine * surface.areas[:, None]).T]
+        share += ((force - (coarse * facets.areas[:, None]).T) ** 2).sum(axis=0) / scale[sample] ** 2
+    return share
 
 
 def _nearness(samples: Samples, up: Array) -> Array:

@@ -5,7 +5,6 @@ part of a mesh. A facet has the sum of their area vectors; so a closed surface s
 """
 
 import dataclasses
-import heapq
 from typing import Final
 
 import numpy as np
@@ -32,58 +31,44 @@ def features(surface: Surface, nearness: Array) -> Array:
     return np.hstack([surface.centres @ nearness / surface.size, TURN * surface.normals])
 
 
-def bisections(points: Array, weights: Array, count: int) -> list[Labels]:
-    """Cut a set of points in two, along its longest principal axis, again and again, the widest part first.
+def split(labels: Labels, chosen: Labels, points: Array, weights: Array) -> Labels:
+    """Labels after each chosen cluster was cut in two across its longest principal axis, where it can be.
 
     Args:
-        points: (n, k).
-        weights: (n,).
-        count: Parts that are wanted at most.
-
-    Returns:
-        For each part, in the order in which they arise, the points that leave the part they were in for it.
+        labels: The cluster of each point, 0 to n - 1, (npoint,).
+        chosen: Clusters.
+        points: (npoint, k).
+        weights: (npoint,).
     """
-    parts = [np.arange(len(points))]
-    left = [parts[0]]
-    queue: list[tuple[float, int, Labels, Labels]] = []
-
-    def judge(number: int) -> None:
-        part = parts[number]
+    labels = labels.copy()
+    order = np.argsort(labels, kind="stable")
+    ends = np.cumsum(np.bincount(labels))
+    fresh = len(ends)
+    for cluster in chosen:
+        part = order[ends[cluster - 1] if cluster else 0 : ends[cluster]]
         apart = points[part] - np.average(points[part], axis=0, weights=weights[part])
-        spread, axes = np.linalg.eigh((weights[part, None] * apart).T @ apart)
-        ahead = apart @ axes[:, -1] > 0.0
+        axis = np.linalg.eigh((weights[part, None] * apart).T @ apart)[1][:, -1]
+        ahead = apart @ axis > 1e-12
         if ahead.any() and not ahead.all():
-            heapq.heappush(queue, (-float(spread[-1]), number, part[ahead], part[~ahead]))
-
-    judge(0)
-    while queue and len(parts) < count:
-        _, number, leaving, staying = heapq.heappop(queue)
-        parts[number] = staying
-        parts.append(leaving)
-        left.append(leaving)
-        judge(number)
-        judge(len(parts) - 1)
-    return left
+            labels[part[ahead]] = fresh
+            fresh += 1
+    return labels
 
 
-def clusters(points: Array, weights: Array, cuts: list[Labels], count: int) -> Labels:
-    """The cluster of each point, (n,): `count` bisections, then rounds of Lloyd's algorithm."""
-    labels = np.zeros(len(points), dtype=np.intp)
-    for number, leaving in enumerate(cuts[:count]):
-        labels[leaving] = number
+def settled(labels: Labels, points: Array, weights: Array) -> Labels:
+    """Labels after each point went to the cluster of the nearest mean, ROUNDS times."""
     for _ in range(ROUNDS):
         weight = np.bincount(labels, weights)
-        sums = np.column_stack([np.bincount(labels, weights * column) for column in points.T])
-        kept = weight > 0.0
-        labels = cKDTree(sums[kept] / weight[kept, None]).query(points)[1]
-    found: Labels = np.unique(labels, return_inverse=True)[1]
-    return found
+        means = np.column_stack([np.bincount(labels, weights * column) for column in points.T]) / weight[:, None]
+        labels = np.unique(cKDTree(means).query(points)[1], return_inverse=True)[1]
+    return labels
 
 
 def merged(surface: Surface, labels: Labels) -> Surface:
     """One facet for each cluster: its area vector, at its centre of area, shifted so that the volume stays.
 
-    A facet is kept as an equilateral triangle of its centroid, normal and area.
+    A facet is kept as an equilateral triangle of its centroid, normal and area. Those without an area, which hold both
+    sides of a plate, are kept too, as triangles of next to no area.
     """
     vectors, areas, centres = surface.normals * surface.areas[:, None], surface.areas, surface.centres
 
@@ -91,13 +76,13 @@ def merged(surface: Surface, labels: Labels) -> Surface:
         return np.column_stack([np.bincount(labels, column) for column in values.T])
 
     vector, middle = summed(vectors), summed(areas[:, None] * centres) / np.bincount(labels, areas)[:, None]
-    area = np.linalg.norm(vector, axis=1)
-    kept = area > 1e-14 * areas.sum()  # a cluster may hold both sides of a plate, and push nowhere
-    normal = vector[kept] / area[kept, None]
+    area = np.maximum(np.linalg.norm(vector, axis=1), 1e-15 * areas.sum())
+    normal = np.where(area[:, None] > 1e-14 * areas.sum(), vector / area[:, None], [0.0, 0.0, 1.0])
     volume = np.bincount(labels, np.einsum("ij,ij->i", centres, vectors))  # three times that of the cone to the origin
     lacking = volume - np.einsum("ij,ij->i", middle, vector)
-    centre = middle[kept] + normal * (lacking[kept] / area[kept])[:, None]
-    return dataclasses.replace(surface, triangles=_equilateral(centre, normal, area[kept]), outline=surface.corners)
+    flat = area > 1e-3 * np.bincount(labels, areas)
+    centre = middle + np.where(flat[:, None], normal * (lacking / area)[:, None], 0.0)
+    return dataclasses.replace(surface, triangles=_equilateral(centre, normal, area), outline=surface.corners)
 
 
 def _equilateral(centres: Array, normals: Array, areas: Array) -> Array:

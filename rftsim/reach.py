@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from rftsim.economy import Reach, middle
+from rftsim.economy import POSES, Reach, middle
 from rftsim.sand import FreeSurface
 from rftsim.surface import Array, Surface
 
@@ -16,21 +16,20 @@ GIVE: Final = 0.05
 """Share of its range by which a joint may pass its limits, which are soft."""
 
 
-def sampled_reach(model: mujoco.MjModel, body: int, surface: Surface, count: int, seed: int) -> Reach:
+def sampled_reach(model: mujoco.MjModel, body: int, surface: Surface, seed: int) -> Reach:
     """Orientations and motions of a body at joint positions drawn within their ranges.
 
     Args:
         model: Compiled.
         body: The body's id.
         surface: Its surface.
-        count: Number of orientations.
         seed: Of the joint positions.
     """
     rng = np.random.default_rng(seed)
     data = mujoco.MjData(model)
-    turn, motions = np.empty((count, 3, 3)), np.empty((count, 6, 6))
+    turn, motions = np.empty((POSES, 3, 3)), np.empty((POSES, 6, 6))
     jacobian, scale = np.empty((2, 3, model.nv)), np.repeat([1.0, surface.size / 2], 3)
-    for i in range(count):
+    for i in range(POSES):
         _scatter(model, data.qpos, rng)
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)

@@ -2,6 +2,7 @@
 
 import dataclasses
 import difflib
+import functools
 import math
 import warnings
 from collections.abc import Iterable, Mapping
@@ -196,8 +197,8 @@ def _reduce(
     economies = {}
     for name, surface in surfaces.items():
         body = model.body(name).id
-        reaches = (sampled_reach(model, body, surface, economy.POSES, seed) for seed in (0, 1))
-        surfaces[name], found = economy.reduced(surface, numbers, tolerance, *reaches)
+        reach = functools.partial(sampled_reach, model, body, surface)
+        surfaces[name], found = economy.reduced(surface, numbers, tolerance, reach)
         economies[name] = found
         if found.elements < found.triangles:
             said = f"{found.elements} elements keep its wrench within {100 * found.error:.2g} %"
