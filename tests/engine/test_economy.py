@@ -1,0 +1,179 @@
+"""What of a scene can touch sand, how far its joints let it go, and what is modelled of it under a tolerance."""
+
+import json
+
+import mujoco
+import numpy as np
+import pytest
+from rftsim_models import hexapod, wheels
+from trees import SAND, spec_of, xml
+
+import rftsim
+from rftsim import FreeSurface, SceneError, add_sand
+from rftsim.advice import advise
+from rftsim.geometry import body_surface
+from rftsim.reach import clearance, sampled_reach
+from rftsim.scenes import stage
+
+CRANE = """
+<body name="crane" pos="1 0 1">
+  <joint axis="0 0 1" range="-90 90"/> <geom type="box" size=".1 .1 .1"/>
+  <body name="jib" pos="0 0 .1">
+    <joint axis="0 1 0" range="-60 60"/> <geom type="capsule" fromto="0 0 0 .6 0 0" size=".03"/>
+    <body name="hook" pos=".6 0 0"> <joint type="slide" axis="0 0 -1" range="0 1.2"/> <geom size=".05"/> </body>
+    <body name="lamp" pos=".3 0 .1"> <geom size=".03"/> </body>
+  </body>
+</body>
+<body name="lift" pos="-1 0 1"> <joint type="slide" axis="0 0 1" range="-.3 .3"/> <geom type="box" size=".1 .1 .1"/>
+</body>
+<body name="rope" pos="-1 0 1"> <joint type="slide" axis="0 0 1"/> <geom type="box" size=".1 .1 .1"/> </body>
+<body name="cart" pos="-1 0 1"> <joint type="slide" axis="1 1 0"/> <geom type="box" size=".1 .1 .1"/> </body>
+<body name="block" pos="0 1 .2"> <freejoint/> <geom type="box" size=".1 .05 .05"/> </body>
+<body name="pillar" pos="0 0 .5"> <geom type="box" size=".05 .05 .5"/> </body>
+"""
+LEVEL = FreeSurface()
+
+
+def surface_of(model, name):
+    return body_surface(model, model.body(name).id, collision_only=True, max_edge=None, allow_open=False)
+
+
+@pytest.mark.parametrize(
+    ("body", "height"),
+    [
+        ("crane", 0.9),  # turns about the vertical
+        ("jib", 1.1 - 0.63),  # may hang straight down from its hinge
+        ("lamp", 1.1 - np.hypot(0.3, 0.1) - 0.03),
+        ("lift", 1.0 - 0.33 - 0.1),  # at the end of its range, and a twentieth of that beyond
+        ("cart", 0.9),  # slides on the level
+        ("rope", -np.inf),
+        ("block", -np.inf),
+    ],
+)
+def test_how_near_a_body_can_come(body, height):
+    """The bound is what the tree and the joints' ranges say."""
+    model = spec_of(CRANE).compile()
+    found = clearance(model, model.body(body).id, surface_of(model, body), LEVEL)
+    assert found == pytest.approx(height, abs=1e-2)
+
+
+def test_no_pose_within_the_ranges_comes_nearer():
+    """The lowest corner of a thousand random poses stays above the bound, on level and on tilted sand."""
+    model = spec_of(CRANE).compile()
+    data, rng = mujoco.MjData(model), np.random.default_rng(0)
+    for sand in (LEVEL, FreeSurface(height=-0.3, normal=(0.3, -0.2, 1.0))):
+        bounds, surfaces = {}, {}
+        for name in ("crane", "jib", "hook", "lamp", "lift"):
+            surfaces[name] = surface_of(model, name)
+            bounds[name] = clearance(model, model.body(name).id, surfaces[name], sand)
+            assert np.isfinite(bounds[name])
+        for _ in range(1000):
+            free = model.jnt_type == mujoco.mjtJoint.mjJNT_FREE
+            at = model.jnt_qposadr[~free & (model.jnt_limited == 1)]
+            low, high = model.jnt_range[~free & (model.jnt_limited == 1)].T
+            data.qpos[at] = rng.uniform(low, high)
+            mujoco.mj_kinematics(model, data)
+            for name, surface in surfaces.items():
+                body = data.body(name)
+                world = surface.corners @ body.xmat.reshape(3, 3).T + body.xpos
+                assert (world @ sand.normal).min() - sand.offset >= bounds[name] - 1e-9
+
+
+def test_a_tolerance_leaves_out_what_cannot_reach_the_sand():
+    """Without it every moving body is modelled; with it those out of reach are not, unless they are named."""
+    moving = {"crane", "jib", "hook", "lamp", "lift", "rope", "cart", "block"}
+    assert set(add_sand(spec_of(CRANE), SAND).surfaces) == moving
+    bed = add_sand(spec_of(CRANE), SAND, tolerance=0.2)
+    assert set(bed.surfaces) == {"hook", "rope", "block"}
+    assert bed.reasons["lift"] == "stays 0.57 m or more above the sand, by its tree and its joints' ranges"
+    assert bed.reasons["pillar"] == "cannot move"
+    assert set(add_sand(spec_of(CRANE), SAND, tolerance=0.2, bodies=["lift"]).surfaces) == {"lift"}
+
+
+def test_nothing_within_reach_is_an_error():
+    """The error says why no body would feel the sand."""
+    with pytest.raises(SceneError, match=r"stays 1.9 m or more above"):
+        add_sand(spec_of('<body pos="0 0 2"><joint axis="0 0 1"/><geom size=".1"/></body>'), SAND, tolerance=0.1)
+
+
+@pytest.mark.parametrize("tolerance", [0.0, -0.1, 1.0, np.nan])
+def test_tolerances_that_cannot_be(tolerance):
+    """It is a share."""
+    with pytest.raises(SceneError, match="tolerance must lie between 0 and 1"):
+        add_sand(spec_of(), SAND, tolerance=tolerance)
+
+
+def test_a_wheel_on_its_carriage_turns_in_its_plane():
+    """Its orientations keep the axle level; its motions are two velocities and one rate."""
+    model = wheels.build_wheel(wheels.GROUSER_WHEEL, 30.0).compile()
+    reach = sampled_reach(model, model.body("wheel").id, surface_of(model, "wheel"), 0)
+    np.testing.assert_allclose(reach.rotations[:, :, 1], np.tile([0, 1, 0], (len(reach.rotations), 1)), atol=1e-12)
+    assert np.ptp(reach.rotations[:, 0, 0]) > 1.0
+    np.testing.assert_allclose(
+        reach.motions, np.tile(np.diag([1, 0, 1, 0, 1, 0]), (len(reach.motions), 1, 1)), atol=1e-9
+    )
+
+
+def test_a_free_body_goes_everywhere():
+    """A free joint allows every motion in every orientation."""
+    model = spec_of().compile()
+    reach = sampled_reach(model, 1, surface_of(model, "ball"), 0)
+    np.testing.assert_allclose(reach.motions, np.tile(np.eye(6), (len(reach.motions), 1, 1)), atol=1e-9)
+
+
+def test_a_model_under_a_tolerance_is_a_model():
+    """Fewer elements, near the same force; readouts and the bounding box follow."""
+    drop = xml('<body name="b" pos="0 0 .03"><freejoint/><geom type="ellipsoid" size=".1 .06 .05"/></body>')
+    models = [rftsim.load(drop, SAND, max_edge=0.004, tolerance=tolerance) for tolerance in (None, 0.05)]
+    counts, rest = [], []
+    for model in models:
+        data = mujoco.MjData(model)
+        while data.time < 0.5:
+            mujoco.mj_step(model, data)
+        counts.append(len(rftsim.tractions(model, data, "b").area))
+        rest.append(data.qpos[2])
+    assert counts[1] < counts[0] / 10
+    assert rest[1] == pytest.approx(rest[0], abs=2e-4)
+
+
+# Laws -----------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("scene", "law", "rpm", "advised"),
+    [
+        ("grouser-wheel", "drft2d", 60, ["drft2d", "drft2d"]),
+        ("grouser-wheel", "drft2d", 20, ["drft2d", "rft2d"]),
+        ("grouser-wheel", "rft3d", 20, ["rft2d", "rft3d"]),
+        ("grouser-wheel", "rft3d", 60, ["rft2d", "drft3d"]),
+        ("four-flap-runner", "drft2d", 100, ["drft2d", "drft2d"]),
+    ],
+)
+def test_laws_for_a_wheel(scene, law, rpm, advised):
+    """A planar scene needs no 3D law; below a Froude number of 0.4 no dynamic one."""
+    staged = stage(scene, law=law, settings={"rpm": str(rpm)})
+    assert [one.law for one in advise(staged.model, staged.bed)] == advised
+
+
+@pytest.mark.parametrize(("speed", "law", "number"), [(0.3, "rft3d", "0.36 < 0.4"), (0.6, "drft3d", "0.71, and from")])
+def test_laws_for_a_robot(speed, law, number):
+    """A free robot needs a 3D law; its speed, v / sqrt(g L) of its smallest body, decides on the dynamic terms."""
+    spec = hexapod.build_hexapod()
+    bed = add_sand(spec)
+    dimensions, dynamics = advise(spec.compile(), bed, speed)
+    assert dimensions.law == "rft3d"
+    assert dynamics.law == law
+    assert number in dynamics.reason
+
+
+def test_a_flat_law_in_space_is_advised_against():
+    """A 2D law does not feel what moves across its plane."""
+    spec = spec_of()
+    bed = add_sand(spec, SAND, "rft2d")
+    assert [one.law for one in advise(spec.compile(), bed)] == ["rft3d", "rft2d"]
+
+
+def test_advice_is_written_as_json():
+    """It holds nothing but text."""
+    staged = stage("intruder")
+    assert "nothing moves at the start" in json.dumps([one._asdict() for one in advise(staged.model, staged.bed)])

@@ -1,0 +1,144 @@
+"""Facets in place of triangles: what they keep exactly, and what within the tolerance."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+import trimesh
+from rftsim_models import wheels
+from rftsim_models.outline import extruded
+from shapes import ONE, blob, rim
+
+from rftsim import PRESETS, FreeSurface, make_surface, surface_force
+from rftsim.economy import DEPTHS, HELD_BACK, draw, errors, free_reach, reduced, wrenches
+from rftsim.facets import merged, settled, split
+from rftsim.laws import get_law
+from rftsim.packed import BLOCK, pack_sand
+
+BED = pack_sand(PRESETS["poppy-seeds"], get_law("rft3d"), FreeSurface(), (0, 1, 0))
+
+
+def volume(surface):
+    return np.einsum("ij,ij,i->", surface.centres, surface.normals, surface.areas) / 3
+
+
+def closure(surface):
+    return np.linalg.norm(surface.normals.T @ surface.areas) / surface.areas.sum()
+
+
+def _box():
+    mesh = trimesh.creation.box((0.3, 0.2, 0.1)).subdivide().subdivide().subdivide()
+    return make_surface(mesh.vertices, mesh.faces)
+
+
+@pytest.mark.parametrize("count", [2, 30, 500])
+def test_facets_close_and_keep_the_volume(count):
+    """sum n A = 0 and sum c . n A / 3 = V, however the triangles are put together."""
+    rng = np.random.default_rng(count)
+    surface = blob(rng, subdivisions=4)
+    labels = np.append(np.arange(count), rng.integers(count, size=surface.ntri - count))
+    facets = merged(surface, labels)
+    assert facets.ntri == count
+    assert closure(facets) < 1e-12
+    assert volume(facets) == pytest.approx(volume(surface), rel=1e-12)
+    assert facets.size == surface.size
+
+
+def test_a_facet_of_each_triangle_is_that_triangle():
+    """Nothing changes where nothing is put together."""
+    surface = blob(np.random.default_rng(0))
+    facets = merged(surface, np.arange(surface.ntri))
+    for name in ("centres", "normals", "areas"):
+        np.testing.assert_allclose(getattr(facets, name), getattr(surface, name), rtol=1e-9, atol=1e-12)
+
+
+def test_buried_flat_faces_are_exact():
+    """Depth is linear, so a box drawn through the sand feels the same in 6 facets as in 768 triangles."""
+    box = _box()
+    facets = merged(box, np.unique(np.round(box.normals), axis=0, return_inverse=True)[1])
+    assert facets.ntri == 6
+    motion = {"position": (0, 0, -0.5), "velocity": (0.3, -0.2, -0.1)}
+    forces = [surface_force(surface, ONE, **motion).force for surface in (box, facets)]
+    np.testing.assert_allclose(*forces, rtol=1e-12)
+
+
+def test_both_sides_of_a_plate_in_one_facet_push_nowhere():
+    """A cluster whose area vectors cancel keeps its place and no area to speak of."""
+    box = _box()
+    facets = merged(box, np.zeros(box.ntri, dtype=int))
+    assert facets.areas[0] < 1e-12 * box.areas.sum()
+    assert np.isfinite(facets.centres).all()
+
+
+def test_splitting_and_settling_cover_all_triangles():
+    """Clusters are numbered without gaps, and each split adds one."""
+    surface = blob(np.random.default_rng(1))
+    points, labels = np.hstack([surface.centres, surface.normals]), np.zeros(surface.ntri, dtype=int)
+    for count in (2, 4, 8, 16):
+        labels = split(labels, np.arange(count // 2), points, surface.areas)
+        assert np.array_equal(np.unique(labels), np.arange(count))
+    settled_labels = settled(labels, points, surface.areas)
+    assert np.array_equal(np.unique(settled_labels), np.arange(settled_labels.max() + 1))
+
+
+def fresh_error(surface, facets, seeds, depths):
+    """Largest error over poses and motions that nothing was chosen by."""
+    worst = 0.0
+    for seed in seeds:
+        samples = draw(surface, BED, free_reach(seed), depths, seed)
+        pair = [wrenches(s, BED, samples) for s in (surface, facets)]
+        worst = max(worst, float(errors(*pair, samples.depth).max()))
+    return worst
+
+
+def test_tolerance_is_kept():
+    """The error is as said where it was measured, under twice the tolerance elsewhere, with fewer elements."""
+    surface = blob(np.random.default_rng(2), subdivisions=4)
+    facets, found = reduced(surface, BED, 0.03)
+    assert found.triangles == surface.ntri
+    assert found.elements == facets.ntri <= surface.ntri / 4
+    assert found.error <= 0.03
+    assert fresh_error(surface, facets, [0], DEPTHS) == pytest.approx(found.error)
+    assert fresh_error(surface, facets, [1], HELD_BACK) == pytest.approx(found.held_back)
+    assert fresh_error(surface, facets, [1001], HELD_BACK) < 0.06
+
+
+def test_a_block_is_left_alone():
+    """Up to 64 triangles cost the same, so none is put together."""
+    mesh = trimesh.creation.box((0.3, 0.2, 0.1))
+    surface = make_surface(mesh.vertices, mesh.faces)
+    facets, found = reduced(surface, BED, 0.01)
+    assert surface.ntri <= BLOCK
+    assert facets.ntri == found.elements == surface.ntri
+    assert found.error == 0.0
+
+
+def test_the_same_every_time():
+    """Poses and motions are drawn from fixed seeds."""
+    surface = rim(sections=96)
+    pair = [reduced(surface, BED, 0.05)[0] for _ in range(2)]
+    np.testing.assert_array_equal(pair[0].centres, pair[1].centres)
+
+
+def grousered_wheel():
+    """Of [Agarwal] Table 4.1 with its grousers in full, 20,160 faces."""
+    parameters = dataclasses.replace(wheels.GROUSER_WHEEL, arc=16, flank=4, top=4)
+    return make_surface(*extruded(parameters.outline(False), parameters.width, rings=7, strips=5))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "surface",
+    [grousered_wheel(), blob(np.random.default_rng(3), subdivisions=5)],
+    ids=["grousered wheel", "blob"],
+)
+def test_a_tenth_of_twenty_thousand_faces(surface):
+    """1 % with at least ten times fewer elements, and no more than 2 % in poses and motions never seen."""
+    assert 20_000 < surface.ntri < 21_000
+    facets, found = reduced(surface, BED, 0.01)
+    fresh = fresh_error(surface, facets, range(1000, 1004), HELD_BACK)
+    print(f"{found}, fresh {fresh:.4f}, closure {closure(facets):.1e}")
+    assert found.elements <= surface.ntri / 10
+    assert found.error <= 0.01
+    assert fresh <= 0.02
+    assert closure(facets) < 1e-12
