@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 from matplotlib.figure import Figure
 
+from rftsim.bench.kernel import Arithmetic, Cost
 from rftsim.bench.stability import FORCES, Row
 from rftsim.demo import Point
 from rftsim.render import render, watching
@@ -129,6 +130,23 @@ def plot_study(study: Study, measured: Measured, path: Path) -> None:
     """Draw a study of `rftsim validate`."""
     figure = Figure(figsize=study.size, layout="constrained")
     study.draw(measured, figure)
+    figure.savefig(path, dpi=110)
+
+
+def plot_kernel(costs: list[Cost], limit: Arithmetic, path: Path) -> None:
+    """Draw the time of an evaluation against the number of triangles."""
+    figure = Figure(figsize=(7, 4.5), layout="constrained")
+    axis = figure.subplots()
+    sizes = np.array([cost.triangles for cost in costs])
+    axis.loglog(
+        sizes, [1e6 * cost.oracle_seconds for cost in costs], "o-", color="C3", label="NumPy, as the paper writes it"
+    )
+    axis.loglog(sizes, [1e6 * cost.seconds for cost in costs], "o-", color="C0", linewidth=2.5, label="rftsim")
+    axis.loglog(sizes, 1e-3 * limit.nanoseconds * sizes, "--", color="0.4", label="arithmetic alone")
+    axis.set_xlabel("triangles, all buried")
+    axis.set_ylabel("force and moment of a body [µs]")
+    axis.grid(alpha=0.3)
+    axis.legend()
     figure.savefig(path, dpi=110)
 
 

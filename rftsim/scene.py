@@ -203,7 +203,7 @@ def _reduce(
         if found.elements < found.triangles:
             said = f"{found.elements} elements keep its wrench within {100 * found.error:.2g} %"
         elif found.triangles <= packed.BLOCK:
-            said = f"up to {packed.BLOCK} triangles cost the same"
+            said = f"one block of {packed.BLOCK} already, the least that the implicit force's derivative takes"
         else:
             said = f"fewer elements would err by more than {100 * tolerance:g} %"
         reasons[name] += f"; {said}"

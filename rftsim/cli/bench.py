@@ -11,11 +11,12 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
+from rftsim.bench import kernel
 from rftsim.bench.hard_cases import CASES, Force
 from rftsim.bench.stability import FORCES, STEPS, Row, Starts, Study, Summary, run, summarise
 from rftsim.cli.output import check_writable, print_json, replacing
 from rftsim.errors import RftsimError
-from rftsim.plots import plot_stability
+from rftsim.plots import plot_kernel, plot_stability
 
 
 @dataclasses.dataclass(frozen=True)
@@ -25,26 +26,34 @@ class Bench:
     stability: the hard cases (rest, light legs, stiff servos, impacts, edges, constraints) at time steps from 0.1 to
     10 ms with the implicit and the explicit force, against the exact or converged answer.
 
+    kernel: the time of a buried triangle by the size of the body, over that of the tests' NumPy, and the share of what
+    the processor's arithmetic allows.
+
     Example: rftsim bench stability --plot out
     """
 
-    study: tyro.conf.Positional[Literal["stability"]]
+    study: tyro.conf.Positional[Literal["stability", "kernel"]]
     """What is measured."""
     cases: tuple[str, ...] = ()
     """Names of cases; by default all."""
     starts: int = 1000
     """Random starts of a free runner."""
     quick: bool = False
-    """Steps of 1 and 5 ms and 20 random starts only."""
+    """Steps of 1 and 5 ms and 20 random starts only; bodies of up to 20,480 triangles."""
+    oracle: Path = Path("tests/oracle.py")
+    """The tests' laws in NumPy, that kernel compares with where they are there."""
     plot: Path | None = None
-    """Folder for stability.png."""
+    """Folder for stability.png or kernel.png."""
     memory: Path = Path("out/bench")
-    """Folder for what was measured: a study that was stopped goes on from there."""
+    """Folder for what stability measured: if stopped, it goes on from there."""
     json: bool = False
     """Print JSON instead of the tables."""
 
     def __call__(self, warnings: Callable[[], list[str]]) -> None:
         """Measure, print and draw."""
+        if self.study == "kernel":
+            self._kernel()
+            return
         unknown = sorted(set(self.cases) - set(CASES))
         if unknown:
             raise RftsimError(f"no case {unknown[0]!r}; cases are {', '.join(CASES)}")
@@ -72,6 +81,39 @@ class Bench:
         if picture is not None:
             console.print(f"wrote {picture}", highlight=False)
 
+    def _kernel(self) -> None:
+        picture = None if self.plot is None else self.plot / "kernel.png"
+        if self.plot is not None and picture is not None:
+            self.plot.mkdir(parents=True, exist_ok=True)
+            check_writable(picture)
+        sizes = tuple(size for size in kernel.SIZES if not self.quick or size <= 20480)
+        with Progress(console=Console(stderr=True), transient=True, disable=self.json) as bar:
+            task = bar.add_task("kernel", total=kernel.ROUNDS + 1)
+            limit = kernel.arithmetic()
+            bar.advance(task)
+            costs = kernel.measure(sizes, kernel.load_oracle(self.oracle), lambda _: bar.advance(task))
+        power = kernel.exponent(costs)
+        if picture is not None:
+            with replacing(picture) as temporary:
+                plot_kernel(costs, limit, temporary)
+        if self.json:
+            rows = [
+                {"triangles": c.triangles, "ns": c.nanoseconds, "numpy_ratio": _number(c.ratio), "memory": c.memory}
+                for c in costs
+            ]
+            print_json({"law": kernel.LAW, "sizes": rows, "exponent": power, "arithmetic": limit._asdict()})
+            return
+        console = Console()
+        console.print(_kernel_table(costs, limit))
+        console.print(
+            f"time grows with the {power:.3f}th power of the triangles from {kernel.LINEAR} on; the law's "
+            f"{limit.operations:.0f} operations take {limit.nanoseconds:.2f} ns at least",
+            highlight=False,
+            soft_wrap=True,
+        )
+        if picture is not None:
+            console.print(f"wrote {picture}", highlight=False)
+
     def _measure(self, study: Study) -> tuple[list[Row], Starts]:
         names, steps = self.cases or tuple(CASES), (1e-3, 5e-3) if self.quick else STEPS
         count = min(self.starts, 20) if self.quick else self.starts
@@ -84,6 +126,26 @@ class Bench:
             bar.update(task, description="random starts")
             starts = study.starts(count, lambda: bar.advance(task))
         return rows, starts
+
+
+def _kernel_table(costs: list[kernel.Cost], limit: kernel.Arithmetic) -> Table:
+    table = Table()
+    for heading in ("triangles", "body [µs]", "triangle [ns]", "of the limit", "NumPy's time", "memory"):
+        table.add_column(heading, justify="right")
+    for cost in costs:
+        table.add_row(
+            f"{cost.triangles}",
+            f"{1e6 * cost.seconds:.3g}",
+            f"{cost.nanoseconds:.2f}",
+            f"{100 * limit.nanoseconds / cost.nanoseconds:.0f} %",
+            "-" if math.isnan(cost.ratio) else f"× {cost.ratio:.0f}",
+            f"× {cost.memory:.2f}",
+        )
+    return table
+
+
+def _number(value: float) -> float | None:
+    return None if math.isnan(value) else value
 
 
 def _percent(value: float) -> str:
