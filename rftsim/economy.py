@@ -170,8 +170,9 @@ def reduced(
     whole, checked = wrenches(surface, sand, samples), wrenches(surface, sand, checks)
     points = features(surface, _nearness(samples, sand[3:6]))
     labels: Labels = np.zeros(surface.ntri, dtype=np.intp)
-    blocks, attempt = 0.5, 2
-    while blocks * BLOCK < surface.ntri - BLOCK:
+    full = -(-surface.ntri // BLOCK)
+    blocks, attempt = 0.5 if full > 1 else full, 2
+    while blocks < full:
         while (lacking := int(blocks * BLOCK) - (int(labels.max()) + 1)) > 0:
             facets = merged(surface, labels)
             drawn = draw(surface, sand, reach(attempt), DEPTHS, attempt)

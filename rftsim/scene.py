@@ -205,7 +205,7 @@ def _reduce(
         elif found.triangles <= packed.BLOCK:
             said = f"one block of {packed.BLOCK} already, the least that the implicit force's derivative takes"
         else:
-            said = f"fewer elements would err by more than {100 * tolerance:g} %"
+            said = f"no fewer elements found that keep its wrench within {100 * tolerance:g} %"
         reasons[name] += f"; {said}"
     return economies
 
