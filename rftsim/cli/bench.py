@@ -8,6 +8,7 @@ from typing import Literal
 
 import tyro
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
@@ -130,8 +131,8 @@ class Bench:
 
 def _kernel_table(costs: list[kernel.Cost], limit: kernel.Arithmetic) -> Table:
     table = Table()
-    for heading in ("triangles", "body [µs]", "triangle [ns]", "of the limit", "NumPy's time", "memory"):
-        table.add_column(heading, justify="right")
+    for heading in ("triangles", "body [µs]", "each [ns]", "of the limit", "NumPy's time", "memory"):
+        table.add_column(escape(heading), justify="right")
     for cost in costs:
         table.add_row(
             f"{cost.triangles}",

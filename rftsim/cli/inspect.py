@@ -6,6 +6,7 @@ from typing import Annotated, Any
 
 import tyro
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from rftsim.advice import advise
@@ -109,8 +110,8 @@ def _body(whole: Bed, lean: Bed, name: str) -> dict[str, Any]:
 
 def _table(bodies: dict[str, dict[str, Any]], tolerance: float) -> Table:
     table = Table("body", caption=f"needed: what --tolerance {tolerance:g} models; errors of its wrench in %")
-    for heading in ("triangles", "needed", "error", "held back", "area [m^2]"):
-        table.add_column(heading, justify="right")
+    for heading in ("triangles", "needed", "error", "held back", "area [m²]"):
+        table.add_column(escape(heading), justify="right")
     table.add_column("wheel")
     for name, row in bodies.items():
         errors = [f"{100 * row[key]:.2f}" if row[key] is not None else "" for key in ("error", "error_held_back")]
