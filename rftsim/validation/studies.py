@@ -10,7 +10,7 @@ import rftsim_models
 import rftsim
 from rftsim.errors import RftsimError
 from rftsim.kept import Kept
-from rftsim.validation import drill, measured, plates, runner, scaling, wheel
+from rftsim.validation import continuum, drill, measured, plates, runner, scaling, wheel
 from rftsim.validation.study import Measured, Request, Row, Study
 
 STUDIES: Final = {
@@ -23,6 +23,14 @@ STUDIES: Final = {
     "scaling": Study("scaling of whole simulations", scaling, scaling.jobs, scaling.rows, scaling.draw, (12.0, 4.5)),
     "drill": Study(
         "drilling cylinder of [Agarwal] section 5.10", drill, drill.jobs, drill.rows, drill.draw, (15.0, 4.5)
+    ),
+    "continuum": Study(
+        "3D-RFT against the plates and solids of the material point method",
+        continuum,
+        continuum.jobs,
+        continuum.rows,
+        continuum.draw,
+        (15.0, 5.0),
     ),
 }
 """Every study by name."""
