@@ -174,7 +174,7 @@ def _flat_rows(flats: list[dict[str, float]]) -> list[Row]:
 def draw(measured: Measured, figure: Any) -> None:
     """Flat plates over cell size, the map, and the solids: predicted over measured."""
     found = {name.partition("/")[0]: value for name, value in measured.items()}
-    axes = figure.subplots(1, 3)
+    axes = figure.subplots(1, 3 if found.get("solids") else 2)
     if "flat" in found:
         _draw_flat(axes[0], found["flat"])
     if "plates" in found:
@@ -200,15 +200,15 @@ def _draw_flat(axis: Any, flats: list[dict[str, float]]) -> None:
             style = {"color": f"C{k}", "fillstyle": "none" if early else "full"}
             label = f"μ_int {mu:g}" + (", contact a cell early" if early else "")
             axis.plot(1.0 / cells, 1e-6 * alpha / ALPHA_Z_PLATE, mark, label=label, **style)
-            axis.plot([0.0, 1.0 / cells[-1]], [1e-6 * limit(cells, alpha) / ALPHA_Z_PLATE,
-                      1e-6 * alpha[-1] / ALPHA_Z_PLATE], ":", color=f"C{k}")  # fmt: skip
+            ends = np.array([limit(cells, alpha), alpha[0]]) / ALPHA_Z_PLATE
+            axis.plot([0.0, 1.0 / cells[0]], 1e-6 * ends, ":", color=f"C{k}")
         axis.axhline(float(np.interp(mu, *np.array(TABLE_C1).T)) * 1e-6, color=f"C{k}", lw=0.8)
     axis.set_xlabel("cell over the plate's length [-]")
     axis.set_ylabel("ξ_n of a flat plate [MN/m³]; lines: Table C.1")
     axis.set_xlim(0.0)
-    axis.set_ylim(0.0)
+    axis.set_ylim(0.0, 1.4 * axis.get_ylim()[1])
     axis.grid(alpha=0.3)
-    axis.legend(fontsize=7)
+    axis.legend(fontsize=7, ncols=2, loc="upper left")
 
 
 def _diagonal(axis: Any, x: str, y: str) -> None:
