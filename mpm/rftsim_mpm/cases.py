@@ -11,7 +11,7 @@ from rftsim_mpm.bed import level_bed
 from rftsim_mpm.body import Body
 from rftsim_mpm.errors import MpmError
 from rftsim_mpm.fields import Frame
-from rftsim_mpm.follow import Track, Watch, follow
+from rftsim_mpm.follow import Track, Watch, follow, part
 from rftsim_mpm.material import Material, stiffness
 from rftsim_mpm.shapes import box, disc
 from rftsim_mpm.simulation import Simulation
@@ -21,9 +21,20 @@ GRAVITY = 9.8
 """As in the source [m/s^2]."""
 
 
-def part(watch: Watch | None, index: int, count: int) -> Watch | None:
-    """A watch of one run out of several."""
-    return None if watch is None else lambda sim, share: watch(sim, (index + share) / count)
+def _whole_cells(size: tuple[float, float], dx: float) -> tuple[float, float]:
+    """A bed's size, rounded up to whole cells [m]."""
+    return math.ceil(size[0] / dx) * dx, math.ceil(size[1] / dx) * dx
+
+
+def _sim(
+    material: Material, size: tuple[float, float], dx: float, top: float, bodies: list[Body], phi: float | None = None
+) -> Simulation:
+    """Bodies in a level bed of the initial packing `phi`, the box's walls at `top` and as rough as the bodies."""
+    bed = level_bed(material, size, dx, gravity=GRAVITY, phi=phi)
+    friction = bodies[0].friction
+    sim = Simulation(material, bed, dx, (size[0], top), bodies=bodies, gravity=GRAVITY, wall_friction=friction)
+    sim.clear_bodies()
+    return sim
 
 
 @dataclasses.dataclass(frozen=True)
@@ -69,13 +80,10 @@ def cylinder_drag(study: CylinderDrag, watch: Watch | None = None) -> CylinderFo
     for i, depth in enumerate(study.depths):
         young = stiffness(study.rho, GRAVITY, depth, study.mu_int, 0.01)
         material = Material.of_density(study.mu_int, study.rho, young)
-        size = tuple(math.ceil(s / dx) * dx for s in (study.width, depth + 8.0 * study.diameter))
-        bed = level_bed(material, size, dx, gravity=GRAVITY)
+        size = _whole_cells((study.width, depth + 8.0 * study.diameter), dx)
         place = np.array([0.5 * size[0], size[1] - depth])
         body = Body(disc(study.diameter / 2.0), place, np.array([study.speed, 0.0]), study.mu_surf)
-        top = size[1] + 4.0 * study.diameter
-        sim = Simulation(material, bed, dx, (size[0], top), bodies=[body], gravity=GRAVITY, wall_friction=study.mu_surf)
-        sim.clear_bodies()
+        sim = _sim(material, size, dx, size[1] + 4.0 * study.diameter, [body])
         duration = study.travel * study.diameter / study.speed
         track = follow(sim, duration, part(watch, i, len(study.depths)))
         forces.append(track.after(0.6 * duration).force[:, 0].mean(axis=0) / unit)
@@ -151,17 +159,11 @@ def plates(study: Plates, watch: Watch | None = None) -> PlatesForces:
 def _push(study: Plates, offsets: list[float], length: float, watch: Watch | None) -> Track:
     young = stiffness(study.rho, GRAVITY, study.depth, study.mu_int, 0.01)
     material = Material.of_density(study.mu_int, study.rho, young)
-    size = tuple(math.ceil(s / study.dx) * study.dx for s in study.bed)
-    bed = level_bed(material, size, study.dx, gravity=GRAVITY)
-    shape = box(length, 4.0 * study.dx)
-    bodies = [
-        Body(
-            shape, np.array([0.5 * size[0] + o, size[1] + 2.0 * study.dx]), np.array([0.0, -study.speed]), study.mu_surf
-        )
-        for o in offsets
-    ]
-    box_size = (size[0], size[1] + study.depth + 8.0 * study.dx)
-    sim = Simulation(material, bed, study.dx, box_size, bodies=bodies, gravity=GRAVITY, wall_friction=study.mu_surf)
+    size = _whole_cells(study.bed, study.dx)
+    shape, down = box(length, 4.0 * study.dx), np.array([0.0, -study.speed])
+    places = [np.array([0.5 * size[0] + o, size[1] + 2.0 * study.dx]) for o in offsets]
+    bodies = [Body(shape, place, down, study.mu_surf) for place in places]
+    sim = _sim(material, size, study.dx, size[1] + study.depth + 8.0 * study.dx, bodies)
     return follow(sim, study.depth / study.speed, watch)
 
 
@@ -205,20 +207,10 @@ def plowing(study: Plowing, watch: Watch | None = None) -> PlowingForces:
     travel = np.zeros(0)
     for i, phi in enumerate(study.packings):
         material = Material(study.mu_int, chi=study.chi, young=stiffness(1512.0, GRAVITY, study.depth, 0.5, 0.01))
-        size = tuple(math.ceil(s / study.dx) * study.dx for s in study.bed)
-        bed = level_bed(material, size, study.dx, gravity=GRAVITY, phi=phi)
+        size = _whole_cells(study.bed, study.dx)
         place = np.array([0.15, size[1] - study.depth + 0.04])
         body = Body(box(0.03, 0.08), place, np.array([study.speed, 0.0]), study.mu_surf)
-        sim = Simulation(
-            material,
-            bed,
-            study.dx,
-            (size[0], size[1] + 0.15),
-            bodies=[body],
-            gravity=GRAVITY,
-            wall_friction=study.mu_surf,
-        )
-        sim.clear_bodies()
+        sim = _sim(material, size, study.dx, size[1] + 0.15, [body], phi)
         track = follow(sim, study.travel / study.speed, part(watch, i, len(study.packings)))
         travel, force = track.time * study.speed, -track.force[:, 0, 0]
         late = travel > 0.5 * study.travel
@@ -271,15 +263,11 @@ def shear_zone(study: ShearZone, watch: Watch | None = None) -> Wedge:
     """Run case 4."""
     young = stiffness(study.phi_c * study.rho_g, GRAVITY, study.depth, study.mu_int, 0.01)
     material = Material(study.mu_int, rho_g=study.rho_g, phi_c=study.phi_c, chi=study.chi, young=young)
-    size = tuple(math.ceil(s / study.dx) * study.dx for s in study.bed)
-    bed = level_bed(material, size, study.dx, gravity=GRAVITY, phi=study.phi)
+    size = _whole_cells(study.bed, study.dx)
     length = 0.04
     place = np.array([0.5 * size[0], size[1] + 0.01])
     body = Body(box(length, 0.02), place, np.array([0.0, -study.speed]), study.mu_surf)
-    top = size[1] + study.depth + 0.03
-    sim = Simulation(
-        material, bed, study.dx, (size[0], top), bodies=[body], gravity=GRAVITY, wall_friction=study.mu_surf
-    )
+    sim = _sim(material, size, study.dx, size[1] + study.depth + 0.03, [body], study.phi)
     duration = study.depth / study.speed
     shots = [share * duration for share in (0.1, 0.2, 0.35, 0.6)]
     track = follow(sim, duration, watch, shots)

@@ -4,15 +4,14 @@ F = K z + lambda rho L v^2 per metre of width: what dynamic force laws take thei
 """
 
 import dataclasses
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rftsim_mpm.errors import MpmError
+from rftsim_mpm.follow import Watch, part
 from rftsim_mpm.plate import Plate, PlateForce, measure
-from rftsim_mpm.simulation import Simulation
 
 Array = NDArray[np.float64]
 
@@ -77,18 +76,10 @@ class DragForces(NamedTuple):
     runs: list[PlateForce]
 
 
-def drag(study: Drag, watch: Callable[[Simulation, float], None] | None = None) -> DragForces:
+def drag(study: Drag, watch: Watch | None = None) -> DragForces:
     """Drag all the plates; `watch` is told the share of the whole study that is done."""
     plates = study.plates()
-    runs = []
-    for i, plate in enumerate(plates):
-        inner = None
-        if watch is not None:
-
-            def inner(sim: Simulation, share: float, i: int = i) -> None:
-                watch(sim, (i + share) / len(plates))
-
-        runs.append(measure(plate, inner))
+    runs = [measure(plate, part(watch, i, len(plates))) for i, plate in enumerate(plates)]
     depth, speed = np.array([plate.z for plate in plates]), np.array([plate.speed for plate in plates])
     force = np.array([run.force for run in runs])
     basis = np.column_stack([depth, study.rho * study.length * speed**2])

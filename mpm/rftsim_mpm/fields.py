@@ -18,6 +18,8 @@ class Frame(NamedTuple):
     time: float
     place: Array
     """Of each particle, (n, 2): x and z [m]."""
+    spacing: float
+    """Mean distance between particles [m]."""
     strain: Array
     """Equivalent plastic shear strain, (n,) [-]."""
     rate: Array
@@ -52,15 +54,17 @@ class Camera:
         if p.dim == 3:
             middle = sim.bodies[0].position[1] if sim.bodies else 0.5 * sim.size[1]
             seen = np.abs(p.x[:, 1] - middle) <= 0.51 * sim.dx
+        size = p.volume[seen] ** (1.0 / p.dim)
         return Frame(
             time=sim.time,
             place=p.x[seen][:, [0, -1]],
+            spacing=float(size.mean()),
             strain=p.strain[seen],
             rate=rate[seen],
             pressure=p.pressure[seen],
             packing=p.packing[seen],
             velocity=p.v[seen],
-            surface=free_surface(p.x[seen][:, [0, -1]], p.volume[seen] ** (1.0 / p.dim), sim.dx),
+            surface=free_surface(p.x[seen][:, [0, -1]], size, sim.dx),
             outlines=[_outline(body) for body in sim.bodies],
         )
 

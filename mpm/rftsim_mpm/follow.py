@@ -14,6 +14,11 @@ Array = NDArray[np.float64]
 Watch = Callable[[Simulation, float], None]
 
 
+def part(watch: Watch | None, index: int, count: int) -> Watch | None:
+    """A watch of one run out of several."""
+    return None if watch is None else lambda sim, share: watch(sim, (index + share) / count)
+
+
 class Track(NamedTuple):
     """Averages over AVERAGE."""
 

@@ -1,5 +1,6 @@
 """Pictures of sand."""
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -7,13 +8,15 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from scipy.ndimage import binary_closing
+from scipy.spatial import cKDTree
 
 from rftsim_mpm.fields import Frame
 from rftsim_mpm.reading import History
 
 PANELS = {
     "strain": ("equivalent plastic strain [-]", "magma", 99.0),
-    "rate": ("its rate [1/s]", "inferno", 98.0),
+    "rate": ("shear strain rate [1/s]", "inferno", 98.0),
     "pressure": ("pressure [Pa]", "viridis", 99.5),
     "packing": ("packing fraction [-]", "cividis", None),
     "velocity": ("speed [m/s]", "turbo", 99.5),
@@ -21,8 +24,12 @@ PANELS = {
 """Each field's label, colours, and the percentile that the colours end at."""
 
 
+PIXELS = 900
+"""Most pixels along a picture of sand."""
+
+
 def draw_field(axes: Axes, frame: Frame, field: str) -> Any:
-    """Draw the particles coloured by a field, the free surface and the bodies."""
+    """Draw the sand coloured by a field, the free surface and the bodies."""
     label, colours, percentile = PANELS[field]
     values = getattr(frame, field)
     if field == "velocity":
@@ -30,40 +37,58 @@ def draw_field(axes: Axes, frame: Frame, field: str) -> Any:
     low, high = (
         (0.0, max(float(np.percentile(values, percentile)), 1e-12)) if percentile else np.percentile(values, [2, 98])
     )
-    spacing = np.sqrt(np.ptp(frame.place[:, 0]) * max(np.ptp(frame.place[:, 1]), 1e-9) / len(frame.place))
-    axes.set_aspect("equal")
-    axes.set_xlim(frame.place[:, 0].min(), frame.place[:, 0].max())
-    tops = [frame.place[:, 1].max(), *(outline[:, 1].max() for outline in frame.outlines)]
-    axes.set_ylim(frame.place[:, 1].min(), max(tops) + 2 * spacing)
-    width = axes.get_window_extent().width / np.ptp(axes.get_xlim()) * 72.0 / axes.figure.dpi
-    shown = axes.scatter(
-        frame.place[:, 0],
-        frame.place[:, 1],
-        c=values,
-        s=(1.1 * spacing * width) ** 2,
+    image, extent = _image(frame, values)
+    shown = axes.imshow(
+        image,
+        extent=extent,
+        origin="lower",
+        interpolation="nearest",
         cmap=colours,
         vmin=low,
         vmax=high if high > low else low + 1e-6,
-        linewidths=0,
-        marker="s",
-        rasterized=True,
     )
-    jumps = np.abs(np.diff(frame.surface[:, 0])) > 3.0 * np.median(np.diff(frame.surface[:, 0]))
-    pieces = np.split(frame.surface, np.flatnonzero(jumps) + 1)
-    axes.add_collection(LineCollection([piece for piece in pieces if len(piece) > 1], colors="0.3", linewidths=0.8))
+    axes.add_collection(LineCollection(_open_surface(frame.surface, frame.outlines), colors="0.3", linewidths=0.8))
     for outline in frame.outlines:
-        axes.fill(*_hull(outline).T, facecolor="0.75", edgecolor="0.1", linewidth=0.8)
+        axes.fill(*outline.T, facecolor="0.75", edgecolor="0.1", linewidth=0.8)
+    tops = [extent[3], *(outline[:, 1].max() for outline in frame.outlines)]
+    axes.set_xlim(extent[0], extent[1])
+    axes.set_ylim(extent[2], max(tops) + 2.0 * frame.spacing)
+    axes.set_xlabel("x [m]")
+    axes.set_ylabel("z [m]")
     axes.figure.colorbar(shown, ax=axes, label=label, shrink=0.8)
     return shown
 
 
-def _hull(outline: Any) -> Any:
-    """A polygon as it is; the corners of a solid, seen from the side, by their convex hull."""
-    if len(np.unique(outline.round(12), axis=0)) == len(outline):
-        return outline
-    from scipy.spatial import ConvexHull
+def _image(frame: Frame, values: Any) -> tuple[Any, tuple[float, float, float, float]]:
+    """Each pixel in the sand has its nearest particle's value, the others are masked; and the edges (x, x, z, z)."""
+    spacing = frame.spacing
+    low, high = frame.place.min(axis=0) - 0.5 * spacing, frame.place.max(axis=0) + 0.5 * spacing
+    pixel = max(spacing / 3.0, float((high - low).max()) / PIXELS)
+    shape = np.maximum(np.rint((high - low) / pixel).astype(int), 1)
+    x, z = (a + (np.arange(n) + 0.5) * (b - a) / n for a, b, n in zip(low, high, shape, strict=True))
+    distance, nearest = cKDTree(frame.place).query(np.stack(np.meshgrid(x, z), axis=-1))
+    reach = math.ceil(1.5 * spacing / pixel)
+    disc = np.hypot(*np.mgrid[-reach : reach + 1, -reach : reach + 1]) <= reach
+    sand = np.pad(distance <= 0.75 * spacing, reach)
+    sand = binary_closing(sand, disc)[reach:-reach, reach:-reach]  # what is narrower than three particles is a pore
+    return np.ma.masked_where(~sand, values[nearest]), (low[0], high[0], low[1], high[1])
 
-    return outline[ConvexHull(outline).vertices]
+
+def _open_surface(surface: Any, outlines: list[Any]) -> list[Any]:
+    """The free surface in pieces, without what lies inside or under a body."""
+    step = np.median(np.diff(surface[:, 0]))
+    for outline in outlines:
+        surface = surface[surface[:, 1] > _top(outline, surface[:, 0])]
+    jumps = np.diff(surface[:, 0]) > 1.5 * step
+    return [piece for piece in np.split(surface, np.flatnonzero(jumps) + 1) if len(piece) > 1]
+
+
+def _top(outline: Any, x: Any) -> Any:
+    """Height of a polygon's highest point over each x, minus infinity beside it."""
+    (x0, z0), (x1, z1) = outline.T[..., None], np.roll(outline, -1, axis=0).T[..., None]
+    share = (x - x0) / np.where(x1 == x0, 1.0, x1 - x0)
+    height = np.where((x1 == x0) | (share < 0.0) | (share > 1.0), -np.inf, z0 + share * (z1 - z0))
+    return height.max(axis=0)
 
 
 def plot_frame(
@@ -146,18 +171,17 @@ def plot_drag(depth: Any, speed: Any, drag: Any, fit: Any, path: Path) -> None:
 
 def plot_wheel(time: Any, velocity: Any, height: Any, frame: Frame, title: str, path: Path) -> None:
     """Draw speed and height of a wheel against time, and the sand at the end."""
-    figure = Figure(figsize=(13, 9), dpi=110, layout="constrained")
-    grid = figure.add_gridspec(3, 2)
-    axes = [figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[0, 1])]
-    axes[0].plot(time, velocity)
-    axes[0].set_ylabel("speed [m/s]")
-    axes[1].plot(time, 1e3 * height)
-    axes[1].set_ylabel("sinkage [mm]")
-    for axis in axes:
+    figure = Figure(figsize=(13, 7), dpi=110, layout="constrained")
+    axes = figure.subplots(2, 2)
+    axes[0, 0].plot(time, velocity)
+    axes[0, 0].set_ylabel("speed [m/s]")
+    axes[0, 1].plot(time, 1e3 * height)
+    axes[0, 1].set_ylabel("sinkage [mm]")
+    for axis in axes[0]:
         axis.set_xlabel("time [s]")
         axis.grid(alpha=0.3)
-    for row, field in enumerate(("rate", "velocity"), start=1):
-        draw_field(figure.add_subplot(grid[row, :], anchor="W"), frame, field)
+    for axis, field in zip(axes[1], ("rate", "velocity"), strict=True):
+        draw_field(axis, frame, field)
     figure.suptitle(title)
     figure.savefig(path)
 

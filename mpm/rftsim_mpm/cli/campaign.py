@@ -12,6 +12,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from rftsim_mpm.campaign import Status, alone, begin, manifest, read_jobs, results, run, run_on_ray, status
 from rftsim_mpm.cli.report import print_json
+from rftsim_mpm.cli.study import Group
 from rftsim_mpm.errors import MpmError
 from rftsim_mpm.output import check_writable, replacing
 
@@ -133,23 +134,15 @@ class CampaignVerify:
             sys.exit(1)
 
 
-Campaign = (
-    Annotated[CampaignRun, tyro.conf.subcommand("run")]
-    | Annotated[CampaignResume, tyro.conf.subcommand("resume")]
-    | Annotated[CampaignStatus, tyro.conf.subcommand("status")]
-    | Annotated[CampaignVerify, tyro.conf.subcommand("verify")]
-)
-
-
-@dataclasses.dataclass(frozen=True)
-class CampaignCommand:
+class CampaignCommand(
+    Group[
+        Annotated[CampaignRun, tyro.conf.subcommand("run")]
+        | Annotated[CampaignResume, tyro.conf.subcommand("resume")]
+        | Annotated[CampaignStatus, tyro.conf.subcommand("status")]
+        | Annotated[CampaignVerify, tyro.conf.subcommand("verify")]
+    ]
+):
     """A grid of plates or pushes as independent processes; stop it in any way, and resume."""
-
-    command: Campaign
-
-    def __call__(self) -> None:
-        """Run the subcommand."""
-        self.command()
 
 
 def _say(folder: Path, found: Status, json: bool, more: dict[str, Any]) -> None:

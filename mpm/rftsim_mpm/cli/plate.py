@@ -2,104 +2,87 @@
 
 import dataclasses
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-import numpy as np
-import tyro
-from rich.console import Console
+from rftsim_mpm.cli.study import StudyCommand, with_last_frame
+from rftsim_mpm.fields import Frame
+from rftsim_mpm.follow import Watch
+from rftsim_mpm.plate import Array, Plate, PlateForce, extrapolated, finer, measure
 
-from rftsim_mpm.cli.report import print_json, progress
-from rftsim_mpm.fields import Camera, Frame
-from rftsim_mpm.output import check_writable, replacing
-from rftsim_mpm.plate import Plate, PlateForce, extrapolated, finer, measure
-from rftsim_mpm.simulation import Simulation
+
+class Pushed(NamedTuple):
+    """What one plate felt, the sand at the end, and what a finer one felt."""
+
+    force: PlateForce
+    frame: Frame
+    fine: PlateForce | None
 
 
 @dataclasses.dataclass(frozen=True)
-class PlateCommand:
+class PlateCommand(StudyCommand[Plate, Pushed]):
     """Push or drag a flat plate through level sand and read its force.
 
     Example: rftsim-mpm plate --mu-int 0.4 --extrapolate --plot plate.png
     """
 
-    plate: tyro.conf.OmitArgPrefixes[Plate] = dataclasses.field(default_factory=Plate)
+    title = "plate"
     extrapolate: bool = False
     """Also run more cells (twice, in 3D one and a half times as many), and give the limit."""
-    quick: bool = False
-    """Six cells, and less sand around: a look, not a measurement."""
-    json: bool = False
-    """Print JSON."""
-    plot: Path | None = None
-    """Draw force against travel and the sand, .png, .pdf or .svg."""
-    record: Path | None = None
-    """Write a Rerun recording, .rrd."""
 
-    def __call__(self) -> None:
-        """Run and report."""
-        if self.plot:
-            check_writable(self.plot, ".png", ".pdf", ".svg")
-        if self.record:
-            check_writable(self.record, ".rrd")
-        plate = self.plate.quick if self.quick else self.plate
-        second = finer(plate) if self.extrapolate else None
-        found, frame = self._run(plate)
-        report = _report(plate, found)
+    def _quicker(self) -> Plate:
+        return self.study.quick
+
+    def _run(self, study: Plate, watch: Watch) -> Pushed:
+        second = finer(study) if self.extrapolate else None
+        first = 1.0 if second is None else 1.0 / (1.0 + (second.cells / study.cells) ** (study.dim + 1))
+        shoot, frames = with_last_frame(lambda sim, share: watch(sim, first * share))
+        force = measure(study, shoot)
+        fine = None
         if second is not None:
-            other, _ = self._run(second, picture=False)
-            force = extrapolated(found, other, second.cells / plate.cells)
-            report["fine"] = {"cells": second.cells, "force": other.force.tolist(), "noise": other.noise}
-            report["limit"] = {"force": force.tolist(), "alpha": (force / (plate.area * plate.z)).tolist()}
-        if self.plot and frame is not None:
-            from rftsim_mpm.plots import plot_history  # matplotlib is an extra
+            fine = measure(second, lambda sim, share: watch(sim, first + (1.0 - first) * share))
+        return Pushed(force, frames[0], fine)
 
-            with replacing(self.plot) as temporary:
-                plot_history(found.history, _title(plate), temporary, frame, _unit(plate))
-        if self.json:
-            print_json(report)
-            return
-        _print(plate, report)
-        for path in (self.plot, self.record):
-            if path:
-                Console().print(f"wrote {path}", highlight=False)
+    def _report(self, study: Plate, found: Pushed) -> dict[str, Any]:
+        places, stresses = found.force.profile
+        report = {
+            "young_Pa": study.material.young,
+            "force_unit": _unit(study),
+            **found.force.report,
+            "particle_updates_per_s": _rate(found.force),
+            "surface": {"place_m": places.tolist(), "stress_Pa": stresses.tolist()},
+        }
+        if found.fine is not None:
+            limit, cells = _limit(study, found.force, found.fine), finer(study).cells
+            report["fine"] = {"cells": cells, "force": found.fine.force.tolist(), "noise": found.fine.noise}
+            report["limit"] = {"force": limit.tolist(), "alpha": (limit / (study.area * study.z)).tolist()}
+        return report
 
-    def _run(self, plate: Plate, *, picture: bool = True) -> tuple[PlateForce, Frame | None]:
-        camera: Camera | None = None
-        frame: Frame | None = None
-        recorder: Any = None
-        if self.record and picture:
-            from rftsim_mpm.record import Recorder  # rerun is an extra
+    def _lines(self, study: Plate, found: Pushed) -> list[str]:
+        force, rows = found.force, [("", found.force.force)]
+        if found.fine is not None:
+            rows.append((f"{finer(study).cells:g} cells: ", found.fine.force))
+            rows.append(("limit: ", _limit(study, force, found.fine)))
+        return [
+            f"[bold]{_title(study)}[/bold], read at {1e3 * study.z:g} mm",
+            *(label + _components(study, value) for label, value in rows),
+            f"noise of 0.5 ms averages {100 * force.noise:.1f} %; beside the plate the sand has risen "
+            f"{1e3 * force.heave:.1f} mm",
+            f"{force.particles} particles, {force.steps} steps, {force.seconds:.1f} s, "
+            f"{1e-6 * _rate(force):.1f} M particle-updates/s",
+        ]
 
-            recorder = Recorder(self.record)
-        with progress(f"plate, {plate.cells:g} cells", quiet=self.json) as show:
+    def _draw(self, study: Plate, found: Pushed, path: Path) -> None:
+        from rftsim_mpm.plots import plot_history
 
-            def watch(sim: Simulation, share: float) -> None:
-                nonlocal camera, frame
-                if sim.steps % 20 == 0:
-                    show(share)
-                if recorder is not None:
-                    recorder.log(sim)
-                if not (self.plot and picture):
-                    return
-                if camera is None and share > 0.95:
-                    camera = Camera(sim)
-                if camera is not None and share >= 1.0 and frame is None:
-                    frame = camera.shoot(sim)
-
-            found = measure(plate, watch)
-        if recorder is not None:
-            recorder.close()
-        return found, frame
+        plot_history(found.force.history, _title(study), path, found.frame, _unit(study))
 
 
-def _report(plate: Plate, found: PlateForce) -> dict[str, Any]:
-    return {
-        **dataclasses.asdict(plate),
-        "young_Pa": plate.material.young,
-        "force_unit": _unit(plate),
-        **found.report,
-        "particle_updates_per_s": found.particles * found.steps / found.seconds,
-        "surface": {"place_m": found.profile[0].tolist(), "stress_Pa": found.profile[1].tolist()},
-    }
+def _limit(plate: Plate, coarse: PlateForce, fine: PlateForce) -> Array:
+    return extrapolated(coarse, fine, finer(plate).cells / plate.cells)
+
+
+def _rate(found: PlateForce) -> float:
+    return found.particles * found.steps / found.seconds
 
 
 def _unit(plate: Plate) -> str:
@@ -111,26 +94,12 @@ def _title(plate: Plate) -> str:
     return f"plate, {angles}, μ_int {plate.mu_int:g}, μ_surf {plate.mu_surf:g}, {plate.cells:g} cells"
 
 
-def _print(plate: Plate, report: dict[str, Any]) -> None:
-    console, unit = Console(highlight=False, soft_wrap=True), _unit(plate)
-    console.print(f"[bold]{_title(plate)}[/bold], read at {1e3 * plate.z:g} mm")
+def _components(plate: Plate, force: Array) -> str:
     names = "xyz" if plate.dim == 3 else "xz"
-    rows = [("", report["force"], report["alpha_N_m3"])]
-    if "limit" in report:
-        fine = np.array(report["fine"]["force"])
-        rows += [
-            (f"{report['fine']['cells']:g} cells: ", fine, fine / (plate.area * plate.z)),
-            ("limit: ", report["limit"]["force"], report["limit"]["alpha"]),
-        ]
-    for label, force, alpha in rows:
-        text = ", ".join(f"F{n} {f:.4g} {unit}" for n, f in zip(names, force, strict=True))
-        per = ", ".join(f"α{n} {a:.4g}" for n, a in zip(names, alpha, strict=True))
-        console.print(f"{label}{text}; per area and depth {per} N/m³")
-    console.print(
-        f"noise of 0.5 ms averages {100 * report['noise']:.1f} %; beside the plate the sand has risen "
-        f"{1e3 * report['heave_m']:.1f} mm"
-    )
-    console.print(
-        f"{report['particles']} particles, {report['steps']} steps, {report['seconds']:.1f} s, "
-        f"{1e-6 * report['particle_updates_per_s']:.1f} M particle-updates/s"
+    forces = ", ".join(f"F{n} {f:.4g} {_unit(plate)}" for n, f in zip(names, force, strict=True))
+    alphas = force / (plate.area * plate.z)
+    return (
+        f"{forces}; per area and depth "
+        + ", ".join(f"α{n} {a:.4g}" for n, a in zip(names, alphas, strict=True))
+        + " N/m³"
     )

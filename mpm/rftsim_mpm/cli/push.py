@@ -1,53 +1,48 @@
 """`rftsim-mpm push`."""
 
-import dataclasses
 from pathlib import Path
+from typing import Any, NamedTuple
 
-import tyro
-
-from rftsim_mpm.cli.study import Outputs
-from rftsim_mpm.fields import Camera, Frame
-from rftsim_mpm.push import Push, measure
-from rftsim_mpm.simulation import Simulation
+from rftsim_mpm.cli.study import StudyCommand, with_last_frame
+from rftsim_mpm.fields import Frame
+from rftsim_mpm.follow import Watch
+from rftsim_mpm.push import Push, PushForce, measure
 
 
-@dataclasses.dataclass(frozen=True)
-class PushCommand:
+class Pushed(NamedTuple):
+    """What a solid felt, and the sand at the end."""
+
+    force: PushForce
+    frame: Frame
+
+
+class PushCommand(StudyCommand[Push, Pushed]):
     """Push a solid through deep sand and read its force and moment.
 
     Example: rftsim-mpm push --shape cube-60-45 --theta 30 --plot push.png
     """
 
-    study: tyro.conf.OmitArgPrefixes[Push] = dataclasses.field(default_factory=Push)
-    out: tyro.conf.OmitArgPrefixes[Outputs] = dataclasses.field(default_factory=Outputs)
+    title = "push"
 
-    def __call__(self) -> None:
-        """Run and report."""
-        self.out.check()
-        study = self.study.quick if self.out.quick else self.study
-        camera: Camera | None = None
-        frames: list[Frame] = []
-        with self.out.watching(study.shape) as show:
+    def _quicker(self) -> Push:
+        return self.study.quick
 
-            def watch(sim: Simulation, share: float) -> None:
-                nonlocal camera
-                show(sim, share)
-                if camera is None and share > 0.95:
-                    camera = Camera(sim)
-                if camera is not None and share >= 1.0 and not frames:
-                    frames.append(camera.shoot(sim))
+    def _run(self, study: Push, watch: Watch) -> Pushed:
+        shoot, frames = with_last_frame(watch)
+        return Pushed(measure(study, shoot), frames[0])
 
-            found = measure(study, watch)
-        names = "xyz"
-        lines = [
-            ", ".join(f"F{n} {f:.4g} N" for n, f in zip(names, found.force, strict=True)),
-            ", ".join(f"M{n} {m:.4g} N m" for n, m in zip(names, found.moment, strict=True)) + " about the centroid",
-            f"noise of 0.5 ms averages {100 * found.noise:.1f} %",
+    def _report(self, study: Push, found: Pushed) -> dict[str, Any]:
+        return found.force.report
+
+    def _lines(self, study: Push, found: Pushed) -> list[str]:
+        names, felt = "xyz", found.force
+        return [
+            ", ".join(f"F{n} {f:.4g} N" for n, f in zip(names, felt.force, strict=True)),
+            ", ".join(f"M{n} {m:.4g} N m" for n, m in zip(names, felt.moment, strict=True)) + " about the centroid",
+            f"noise of 0.5 ms averages {100 * felt.noise:.1f} %",
         ]
 
-        def draw(path: Path) -> None:
-            from rftsim_mpm.plots import plot_history  # matplotlib is an extra
+    def _draw(self, study: Push, found: Pushed, path: Path) -> None:
+        from rftsim_mpm.plots import plot_history
 
-            plot_history(found.history, f"{study.shape}, θ {study.theta:g}°", path, frames[-1], "N")
-
-        self.out.finish({**dataclasses.asdict(study), **found.report}, lines, draw)
+        plot_history(found.force.history, f"{study.shape}, θ {study.theta:g}°", path, found.frame, "N")

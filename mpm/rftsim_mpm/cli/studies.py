@@ -2,147 +2,142 @@
 
 import dataclasses
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-import tyro
 
-from rftsim_mpm.cli.study import Outputs
-from rftsim_mpm.collapse import Collapse, exponent, fall
-from rftsim_mpm.drag import Drag, drag
-from rftsim_mpm.wheel import Wheel, roll
+from rftsim_mpm.cli.study import StudyCommand
+from rftsim_mpm.collapse import Collapse, Runout, exponent, fall
+from rftsim_mpm.drag import Drag, DragForces, drag
+from rftsim_mpm.follow import Watch, part
+from rftsim_mpm.wheel import Rolling, Wheel, roll
 
 
-@dataclasses.dataclass(frozen=True)
-class DragCommand:
+class DragCommand(StudyCommand[Drag, DragForces]):
     """Drag an upright plate at several depths and speeds, and fit K z + lambda rho L v^2.
 
     Example: rftsim-mpm drag --plot drag.png
     """
 
-    study: tyro.conf.OmitArgPrefixes[Drag] = dataclasses.field(default_factory=Drag)
-    out: tyro.conf.OmitArgPrefixes[Outputs] = dataclasses.field(default_factory=Outputs)
+    title = "drag"
 
-    def __call__(self) -> None:
-        """Run and report."""
-        self.out.check()
+    def _quicker(self) -> Drag:
         study = self.study
-        if self.out.quick:
-            study = dataclasses.replace(study, cells=6.0, depths=study.depths[::2], speeds=study.speeds[-2:])
-        with self.out.watching("drag") as watch:
-            found = drag(study, watch)
-        report = {
-            **dataclasses.asdict(study),
-            "runs": [
-                {"depth_m": z, "speed_m_s": v, "drag_N_m": f, "lift_N_m": lift, "noise": run.noise}
-                for z, v, f, lift, run in zip(
-                    found.depth.tolist(),
-                    found.speed.tolist(),
-                    found.drag.tolist(),
-                    found.lift.tolist(),
-                    found.runs,
-                    strict=True,
-                )
-            ],
+        return dataclasses.replace(study, cells=6.0, depths=study.depths[::2], speeds=study.speeds[-2:])
+
+    def _run(self, study: Drag, watch: Watch) -> DragForces:
+        return drag(study, watch)
+
+    def _report(self, study: Drag, found: DragForces) -> dict[str, Any]:
+        table = np.column_stack([found.depth, found.speed, found.drag, found.lift, [run.noise for run in found.runs]])
+        names = "depth_m", "speed_m_s", "drag_N_m", "lift_N_m", "noise"
+        return {
+            "runs": [dict(zip(names, row, strict=True)) for row in table.tolist()],
             "K_N_m2": found.stiffness,
             "lambda": found.inertia,
         }
-        lines = [
+
+    def _lines(self, study: Drag, found: DragForces) -> list[str]:
+        each = [
             f"depth {1e3 * z:g} mm, {v:g} m/s: drag {f:.2f} N/m, lift {lift:.2f} N/m"
             for z, v, f, lift in zip(found.depth, found.speed, found.drag, found.lift, strict=True)
         ]
-        lines.append(f"F = {found.stiffness:.0f} z + {found.inertia:.2f} rho L v^2 per metre of width")
+        return [*each, f"F = {found.stiffness:.0f} z + {found.inertia:.2f} rho L v^2 per metre of width"]
+
+    def _draw(self, study: Drag, found: DragForces, path: Path) -> None:
+        from rftsim_mpm.plots import plot_drag
 
         def fit(z: float, v: np.ndarray) -> np.ndarray:
             return found.stiffness * z + found.inertia * study.rho * study.length * v**2
 
-        def draw(path: Path) -> None:
-            from rftsim_mpm.plots import plot_drag  # matplotlib is an extra
-
-            plot_drag(found.depth, found.speed, found.drag, fit, path)
-
-        self.out.finish(report, lines, draw)
+        plot_drag(found.depth, found.speed, found.drag, fit, path)
 
 
-@dataclasses.dataclass(frozen=True)
-class WheelCommand:
+class WheelCommand(StudyCommand[Wheel, Rolling]):
     """Let a driven grousered wheel travel and sink.
 
     Example: rftsim-mpm wheel --rpm 60 --plot wheel.png
     """
 
-    study: tyro.conf.OmitArgPrefixes[Wheel] = dataclasses.field(default_factory=Wheel)
-    out: tyro.conf.OmitArgPrefixes[Outputs] = dataclasses.field(default_factory=Outputs)
+    title = "wheel"
 
-    def __call__(self) -> None:
-        """Run and report."""
-        self.out.check()
-        study = self.study
-        if self.out.quick:
-            study = dataclasses.replace(study, dx=0.005, duration=min(study.time, 0.5))
-        with self.out.watching("wheel") as watch:
-            found = roll(study, watch)
-        root = (study.gravity * 2.0 * study.outer) ** 0.5
-        report = {
-            **dataclasses.asdict(study),
+    def _quicker(self) -> Wheel:
+        return dataclasses.replace(self.study, dx=0.005, duration=min(self.study.time, 0.5))
+
+    def _run(self, study: Wheel, watch: Watch) -> Rolling:
+        return roll(study, watch)
+
+    def _report(self, study: Wheel, found: Rolling) -> dict[str, Any]:
+        return {
             "speed_m_s": found.speed,
-            "speed_over_sqrt_gl": found.speed / root,
+            "speed_over_sqrt_gl": found.speed / _root(study),
             "sinkage_m": found.sinkage,
             "slip": found.slip,
             "surface_drop_m": found.drop,
         }
-        lines = [
-            f"{study.rpm:g} RPM: {found.speed:.4f} m/s, {found.speed / root:.3f} sqrt(g l), slip {found.slip:.3f}",
+
+    def _lines(self, study: Wheel, found: Rolling) -> list[str]:
+        scaled = found.speed / _root(study)
+        return [
+            f"{study.rpm:g} RPM: {found.speed:.4f} m/s, {scaled:.3f} sqrt(g l), slip {found.slip:.3f}",
             f"sinkage {1e3 * found.sinkage:.1f} mm; behind, the surface is {1e3 * found.drop:.1f} mm lower than ahead",
         ]
 
-        def draw(path: Path) -> None:
-            from rftsim_mpm.plots import plot_wheel  # matplotlib is an extra
+    def _draw(self, study: Wheel, found: Rolling, path: Path) -> None:
+        from rftsim_mpm.plots import plot_wheel
 
-            track = found.track
-            level = found.sinkage + float(track.after(0.6 * study.time).position[:, 0, 1].mean())
-            height = level - track.position[:, 0, 1]
-            plot_wheel(track.time, track.velocity[:, 0, 0], height, track.frames[-1], f"wheel, {study.rpm:g} RPM", path)
-
-        self.out.finish(report, lines, draw)
+        track = found.track
+        level = found.sinkage + float(track.after(0.6 * study.time).position[:, 0, 1].mean())
+        height = level - track.position[:, 0, 1]
+        plot_wheel(track.time, track.velocity[:, 0, 0], height, track.frames[-1], f"wheel, {study.rpm:g} RPM", path)
 
 
-@dataclasses.dataclass(frozen=True)
-class CollapseCommand:
+def _root(study: Wheel) -> float:
+    """sqrt(g l) with l the outer diameter [m/s]."""
+    return float((study.gravity * 2.0 * study.outer) ** 0.5)
+
+
+class CollapseCommand(StudyCommand[Collapse, list[Runout]]):
     """Let columns collapse and give the exponents of their run-out.
 
     Example: rftsim-mpm collapse --plot collapse.png
     """
 
-    study: tyro.conf.OmitArgPrefixes[Collapse] = dataclasses.field(default_factory=Collapse)
-    out: tyro.conf.OmitArgPrefixes[Outputs] = dataclasses.field(default_factory=Outputs)
+    title = "collapse"
 
-    def __call__(self) -> None:
-        """Run and report."""
-        self.out.check()
-        study = self.study
-        if self.out.quick:
-            study = dataclasses.replace(study, cells=8)
-        found = []
-        with self.out.watching("collapse") as watch:
-            for i, aspect in enumerate(study.aspects):
-                found.append(
-                    fall(study, aspect, lambda sim, share, i=i: watch(sim, (i + share) / len(study.aspects)))  # type: ignore[misc]
-                )
-        aspects, runouts = np.array([f.aspect for f in found]), np.array([f.runout for f in found])
-        report: dict[str, object] = {
-            **dataclasses.asdict(study),
-            "runs": [{"aspect": f.aspect, "runout": f.runout} for f in found],
+    def _quicker(self) -> Collapse:
+        return dataclasses.replace(self.study, cells=8)
+
+    def _run(self, study: Collapse, watch: Watch) -> list[Runout]:
+        count = len(study.aspects)
+        return [fall(study, aspect, part(watch, i, count)) for i, aspect in enumerate(study.aspects)]
+
+    def _report(self, study: Collapse, found: list[Runout]) -> dict[str, Any]:
+        return {
+            "runs": [{"aspect": one.aspect, "runout": one.runout} for one in found],
+            **{f"exponent_{name}": power for name, power in _exponents(found).items()},
         }
-        lines = [f"aspect {f.aspect:.3g}: run-out {f.runout:.3f} L0" for f in found]
-        for name, own in (("squat", aspects <= 2.0), ("tall", aspects >= 3.0)):
-            if own.sum() >= 2:
-                report[f"exponent_{name}"] = exponent(aspects[own], runouts[own])
-                lines.append(f"{name} columns: run-out ~ aspect^{report[f'exponent_{name}']:.2f}")
 
-        def draw(path: Path) -> None:
-            from rftsim_mpm.plots import plot_lines  # matplotlib is an extra
+    def _lines(self, study: Collapse, found: list[Runout]) -> list[str]:
+        return [
+            *(f"aspect {one.aspect:.3g}: run-out {one.runout:.3f} L0" for one in found),
+            *(f"{name} columns: run-out ~ aspect^{power:.2f}" for name, power in _exponents(found).items()),
+        ]
 
-            frames = [(f"aspect {f.aspect:.3g}", f.frame, "strain") for f in found]
-            plot_lines([("run-out", aspects, runouts)], ("aspect H/L0", "(L - L0)/L0"), frames, path)
+    def _draw(self, study: Collapse, found: list[Runout], path: Path) -> None:
+        from rftsim_mpm.plots import plot_lines
 
-        self.out.finish(report, lines, draw)
+        curve = [("run-out", *_arrays(found))]
+        frames = [(f"aspect {one.aspect:.3g}", one.frame, "strain") for one in found]
+        plot_lines(curve, ("aspect H/L0", "(L - L0)/L0"), frames, path)
+
+
+def _arrays(found: list[Runout]) -> tuple[np.ndarray, np.ndarray]:
+    return np.array([one.aspect for one in found]), np.array([one.runout for one in found])
+
+
+def _exponents(found: list[Runout]) -> dict[str, float]:
+    """Of the squat and of the tall columns, where there are two or more."""
+    aspects, runouts = _arrays(found)
+    parts = {"squat": aspects <= 2.0, "tall": aspects >= 3.0}
+    return {name: exponent(aspects[own], runouts[own]) for name, own in parts.items() if own.sum() >= 2}

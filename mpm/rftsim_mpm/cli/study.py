@@ -1,18 +1,24 @@
-"""What the commands that run a study share: a bar, a picture, a recording, and JSON."""
+"""What the commands that run a study share: settings, a bar, a picture, a recording, and JSON."""
 
+import abc
 import contextlib
 import dataclasses
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar, Generic, TypeVar
 
+import tyro
 from rich.console import Console
 
 from rftsim_mpm.cli.report import print_json, progress
+from rftsim_mpm.fields import Camera, Frame
+from rftsim_mpm.follow import Watch
 from rftsim_mpm.output import check_writable, replacing
 from rftsim_mpm.simulation import Simulation
 
-Watch = Callable[[Simulation, float], None]
+Study = TypeVar("Study")
+Found = TypeVar("Found")
+Chosen = TypeVar("Chosen", bound=Callable[[], None])
 
 
 @dataclasses.dataclass(frozen=True)
@@ -72,3 +78,68 @@ class Outputs:
         for path in (self.plot, self.record):
             if path:
                 console.print(f"wrote {path}")
+
+
+@dataclasses.dataclass(frozen=True)
+class StudyCommand(abc.ABC, Generic[Study, Found]):
+    """A study's settings, where its results go, and what is said of them."""
+
+    title: ClassVar[str]
+    """Of the bar."""
+    study: tyro.conf.OmitArgPrefixes[Study]
+    out: tyro.conf.OmitArgPrefixes[Outputs]
+
+    def __call__(self) -> None:
+        """Run and report."""
+        self.out.check()
+        study = self._quicker() if self.out.quick else self.study
+        with self.out.watching(self.title) as watch:
+            found = self._run(study, watch)
+        report = {**dataclasses.asdict(study), **self._report(study, found)}  # type: ignore[call-overload]
+        self.out.finish(report, self._lines(study, found), lambda path: self._draw(study, found, path))
+
+    @abc.abstractmethod
+    def _quicker(self) -> Study:
+        """The study as `--quick` runs it."""
+
+    @abc.abstractmethod
+    def _run(self, study: Study, watch: Watch) -> Found:
+        """Do it."""
+
+    @abc.abstractmethod
+    def _report(self, study: Study, found: Found) -> dict[str, Any]:
+        """What JSON says besides the study's settings."""
+
+    @abc.abstractmethod
+    def _lines(self, study: Study, found: Found) -> list[str]:
+        """The same for people."""
+
+    @abc.abstractmethod
+    def _draw(self, study: Study, found: Found, path: Path) -> None:
+        """Write the picture; matplotlib is an extra, so it is imported here."""
+
+
+def with_last_frame(watch: Watch) -> tuple[Watch, list[Frame]]:
+    """A watch that also takes a frame at the end; its rates are means over the last twentieth of the way."""
+    cameras: list[Camera] = []
+    frames: list[Frame] = []
+
+    def shoot(sim: Simulation, share: float) -> None:
+        watch(sim, share)
+        if not cameras and share > 0.95:
+            cameras.append(Camera(sim))
+        if cameras and share >= 1.0 and not frames:
+            frames.append(cameras[0].shoot(sim))
+
+    return shoot, frames
+
+
+@dataclasses.dataclass(frozen=True)
+class Group(Generic[Chosen]):
+    """A command made of others."""
+
+    command: Chosen
+
+    def __call__(self) -> None:
+        """Run the one that was asked for."""
+        self.command()
