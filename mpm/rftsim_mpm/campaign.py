@@ -255,7 +255,10 @@ def run_on_ray(folder: Path, address: str | None, done: Callable[[str], None]) -
         import ray
     except ImportError as error:
         raise MpmError("--ray needs Ray: pip install ray") from error
-    ray.init(address=address, include_dashboard=False, log_to_driver=False)
+    try:
+        ray.init(address=address, include_dashboard=False, log_to_driver=False)
+    except Exception as error:  # Ray raises no class of its own where a cluster is not there or does not start
+        raise MpmError(f"Ray at {address or 'this machine'} does not answer: {error}") from error
     try:
         now = status(folder)
         wanted = {*now.damaged, *now.missing}

@@ -9,7 +9,8 @@ import sys
 import time
 
 import pytest
-from rftsim_mpm.campaign import begin, key, manifest, read_jobs, results, run, status
+from rftsim_mpm.campaign import begin, key, manifest, read_jobs, results, run, run_on_ray, status
+from rftsim_mpm.cli import main
 from rftsim_mpm.errors import MpmError
 from rftsim_mpm.plate import Plate
 
@@ -91,6 +92,44 @@ def test_killed_and_resumed(file, tmp_path):
     assert again == [damaged.stem]
     assert not status(folder).damaged
     assert len(results(folder)) == 3
+
+
+def test_verify_finds_what_is_damaged_and_resume_redoes_it(file, tmp_path, capsys):
+    """One result is cut short: `verify` names it and exits with 1; `resume` computes this one and no other."""
+
+    def told(*command):
+        ended = 0
+        try:
+            main(["campaign", *command, "--json"])
+        except SystemExit as error:
+            ended = error.code
+        return json.loads(capsys.readouterr().out), ended
+
+    folder = str(tmp_path / "out")
+    assert told("run", str(file), folder, "--processes", "1")[0]["computed"] == 3
+    assert told("verify", folder)[1] == 0
+    kept = {path: path.read_bytes() for path in (tmp_path / "out" / "results").glob("[!.]*.json")}
+    damaged = sorted(kept)[1]
+    damaged.write_bytes(kept[damaged][:-100])
+    found, ended = told("verify", folder)
+    assert (found["damaged"], ended) == ([damaged.stem], 1)
+    assert told("resume", folder, "--processes", "1")[0]["computed"] == 1
+    assert told("verify", folder)[1] == 0
+    assert all(path.read_bytes() == text for path, text in kept.items() if path != damaged)
+
+
+@pytest.mark.slow
+def test_on_ray(file, tmp_path):
+    """Ray's workers find what processes of our own find, bit for bit."""
+    pytest.importorskip("ray")
+    found = []
+    for name, compute in (("here", lambda folder: run(folder, 1, lambda key: None)),
+                          ("ray", lambda folder: run_on_ray(folder, None, lambda key: None))):  # fmt: skip
+        begin(tmp_path / name, read_jobs(file))
+        assert compute(tmp_path / name) == []
+        found.append([result["force"] for result in results(tmp_path / name)])
+    assert found[0] == found[1]
+    assert len(found[0]) == 3
 
 
 def test_a_campaign_can_grow(file, tmp_path):
