@@ -34,7 +34,7 @@ KINDS: dict[str, type[Job]] = {"plates": Plate, "pushes": Push}
 """By what they are called in files."""
 
 DATA = Path(__file__).parent / "data"
-"""Campaigns that are shipped: `plates`, and `flat`."""
+"""Campaigns that are shipped: `plates`, `flat` and `solids`."""
 POINTS = 100
 """Points of the force's history that a result keeps."""
 

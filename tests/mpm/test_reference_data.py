@@ -16,11 +16,12 @@ def plates():
     return results(DATA / "plates")
 
 
-@pytest.mark.parametrize("name", ["plates", "flat"])
+@pytest.mark.parametrize("name", ["plates", "flat", "solids"])
 def test_they_are_whole(name):
+    """What is there is as it was written; solids are still being added."""
     found = status(DATA / name)
-    assert not found.missing
     assert not found.damaged
+    assert not found.missing or name == "solids"
 
 
 def test_there_are_enough(plates):
