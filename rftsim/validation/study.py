@@ -40,7 +40,7 @@ class Row:
         """Whether it passes; None where there is nothing to pass."""
         if self.got is None or (math.isinf(self.low) and math.isinf(self.high)):
             return None
-        return self.low <= self.got <= self.high
+        return bool(self.low <= self.got <= self.high)
 
     @property
     def error(self) -> float | None:
