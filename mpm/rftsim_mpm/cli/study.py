@@ -3,6 +3,7 @@
 import abc
 import contextlib
 import dataclasses
+import importlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, ClassVar, Generic, TypeVar
@@ -11,6 +12,7 @@ import tyro
 from rich.console import Console
 
 from rftsim_mpm.cli.report import print_json, progress
+from rftsim_mpm.errors import MpmError
 from rftsim_mpm.fields import Camera, Frame
 from rftsim_mpm.follow import Watch
 from rftsim_mpm.output import check_writable, replacing
@@ -35,11 +37,13 @@ class Outputs:
     """Write a Rerun recording of the first run, .rrd."""
 
     def check(self) -> None:
-        """Refuse what cannot be written, before anything runs."""
+        """Refuse what cannot be written, or drawn for want of an extra, before anything runs."""
         if self.plot:
             check_writable(self.plot, ".png", ".pdf", ".svg")
+            _needs("plots", "--plot", "matplotlib")
         if self.record:
             check_writable(self.record, ".rrd")
+            _needs("record", "--record", "rerun-sdk")
 
     @contextlib.contextmanager
     def watching(self, title: str) -> Iterator[Watch]:
@@ -65,19 +69,28 @@ class Outputs:
             yield watch
 
     def finish(self, report: dict[str, Any], lines: list[str], draw: Callable[[Path], None]) -> None:
-        """Draw, and print."""
+        """Print, so that nothing is lost whatever becomes of the picture, and draw."""
+        console = Console(highlight=False, soft_wrap=True)
+        if self.json:
+            print_json(report)
+        else:
+            for line in lines:
+                console.print(line)
         if self.plot:
             with replacing(self.plot) as temporary:
                 draw(temporary)
         if self.json:
-            print_json(report)
             return
-        console = Console(highlight=False, soft_wrap=True)
-        for line in lines:
-            console.print(line)
         for path in (self.plot, self.record):
             if path:
                 console.print(f"wrote {path}")
+
+
+def _needs(module: str, option: str, package: str) -> None:
+    try:
+        importlib.import_module(f"rftsim_mpm.{module}")
+    except ImportError as error:
+        raise MpmError(f"{option} needs {package}: pip install {package}") from error
 
 
 @dataclasses.dataclass(frozen=True)
