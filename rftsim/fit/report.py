@@ -7,11 +7,11 @@ import numpy as np
 
 from rftsim.fit.dissipation import FINE_DEG, largest_power
 from rftsim.fit.generic import SOURCE, Generic, Settings, coefficients, determined, fit, nearest
-from rftsim.fit.plates import Plates, at_unit_depth, leading_faces
+from rftsim.fit.plates import Plates, at_unit_depth, directions, leading_faces
 from rftsim.laws import fitted_law
 from rftsim.rigid import surface_force
 from rftsim.sand import Sand
-from rftsim.surface import Array
+from rftsim.surface import EDGE_ON_DOUBLE, Array
 from rftsim.tables import Term
 
 FOLDS: Final = 10
@@ -74,8 +74,8 @@ class Report:
     @property
     def edge_on(self) -> int:
         """Plates that move along their own faces, where the law jumps."""
-        faces = leading_faces(self.plates)
-        return len(np.unique(faces.row[faces.edge_on]))
+        m, v = directions(self.plates.angles)
+        return int((np.abs((m * v).sum(axis=1)) <= EDGE_ON_DOUBLE).sum())
 
     def worst(self, count: int = 5) -> list[Worst]:
         """The plates that are fitted worst."""

@@ -6,6 +6,7 @@ import pytest
 
 import rftsim
 from rftsim.bench import hard_cases, stability
+from rftsim.kept import Kept
 from rftsim.state import HEAD, SPLIT
 
 SAND = rftsim.Sand(xi_n=0.92e6, mu_surf=0.4)
@@ -159,9 +160,8 @@ def test_study_remembers(tmp_path):
     first = study.played("heavy sphere", 1e-2, "implicit")
     again = stability.Study(tmp_path / "study.json")
     assert again.played("heavy sphere", 1e-2, "implicit") == first
-    again.key = "another"
-    again._remember("x", 1)
-    assert stability.Study(tmp_path / "study.json").known == {}
+    Kept(tmp_path / "study.json", b"another source").get("x", lambda: 1)
+    assert stability.Study(tmp_path / "study.json").kept.known == {}
 
 
 EXACT = {"plate": 0.05}
