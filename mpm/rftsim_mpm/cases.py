@@ -11,10 +11,10 @@ from rftsim_mpm.bed import level_bed
 from rftsim_mpm.body import Body
 from rftsim_mpm.errors import MpmError
 from rftsim_mpm.fields import Frame
-from rftsim_mpm.follow import Track, Watch, follow, part
+from rftsim_mpm.follow import Track, follow, part
 from rftsim_mpm.material import Material, stiffness
 from rftsim_mpm.shapes import box, disc
-from rftsim_mpm.simulation import Simulation
+from rftsim_mpm.simulation import Simulation, Watch
 
 Array = NDArray[np.float64]
 GRAVITY = 9.8

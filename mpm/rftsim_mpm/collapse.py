@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from rftsim_mpm.bed import level_bed
 from rftsim_mpm.errors import MpmError
 from rftsim_mpm.fields import Frame
-from rftsim_mpm.follow import Watch, follow
+from rftsim_mpm.follow import follow
 from rftsim_mpm.material import Material, stiffness
-from rftsim_mpm.simulation import Simulation
+from rftsim_mpm.simulation import Simulation, Watch
 
 
 @dataclasses.dataclass(frozen=True)

@@ -3,7 +3,6 @@
 import dataclasses
 import math
 import time
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -14,10 +13,9 @@ from rftsim_mpm.body import Body
 from rftsim_mpm.material import Material
 from rftsim_mpm.reading import History, Log, read
 from rftsim_mpm.shapes import Shape
-from rftsim_mpm.simulation import COURANT, Simulation
+from rftsim_mpm.simulation import COURANT, Simulation, Watch
 
 Array = NDArray[np.float64]
-Watch = Callable[[Simulation, float], None]
 
 
 @dataclasses.dataclass(frozen=True)

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rftsim_mpm.errors import MpmError
-from rftsim_mpm.follow import Watch, part
+from rftsim_mpm.follow import part
 from rftsim_mpm.plate import Plate, PlateForce, measure
+from rftsim_mpm.simulation import Watch
 
 Array = NDArray[np.float64]
 

@@ -1,6 +1,6 @@
 """Run a simulation for a while and keep what its bodies did."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -8,10 +8,9 @@ from numpy.typing import NDArray
 
 from rftsim_mpm.fields import Camera, Frame
 from rftsim_mpm.reading import AVERAGE
-from rftsim_mpm.simulation import Simulation
+from rftsim_mpm.simulation import Simulation, Watch
 
 Array = NDArray[np.float64]
-Watch = Callable[[Simulation, float], None]
 
 
 def part(watch: Watch | None, index: int, count: int) -> Watch | None:

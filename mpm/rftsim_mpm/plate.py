@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rftsim_mpm.body import Body, plane_rotation, turned
-from rftsim_mpm.course import Course, Watch
+from rftsim_mpm.course import Course
 from rftsim_mpm.errors import MpmError
 from rftsim_mpm.fields import Camera
 from rftsim_mpm.material import Material, stiffness
 from rftsim_mpm.reading import History, limit
 from rftsim_mpm.shapes import Surface, box, patches
-from rftsim_mpm.simulation import Simulation
+from rftsim_mpm.simulation import Simulation, Watch
 
 Array = NDArray[np.float64]
 

@@ -7,12 +7,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rftsim_mpm.course import Course, Watch
+from rftsim_mpm.course import Course
 from rftsim_mpm.errors import MpmError
 from rftsim_mpm.intruders import intruder, is_its_own_image
 from rftsim_mpm.material import Material, stiffness
 from rftsim_mpm.reading import History
 from rftsim_mpm.shapes import Shape
+from rftsim_mpm.simulation import Watch
 
 Array = NDArray[np.float64]
 

@@ -1,7 +1,7 @@
 """Sand, bodies and a box, stepped explicitly."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -178,3 +178,7 @@ class Simulation:
                 self.moment[i, 0] = float(np.sum(arm[:, 0] * push[:, 1] - arm[:, 1] * push[:, 0]))
             else:
                 self.moment[i] = -np.cross(arm, push).sum(axis=0)
+
+
+Watch = Callable[[Simulation, float], None]
+"""Called after each step with the simulation and the share of the whole that is done."""

@@ -9,10 +9,10 @@ import numpy as np
 from rftsim_mpm.bed import level_bed
 from rftsim_mpm.body import Body
 from rftsim_mpm.errors import MpmError
-from rftsim_mpm.follow import Track, Watch, follow
+from rftsim_mpm.follow import Track, follow
 from rftsim_mpm.material import Material, stiffness
 from rftsim_mpm.shapes import wheel
-from rftsim_mpm.simulation import Simulation
+from rftsim_mpm.simulation import Simulation, Watch
 
 
 @dataclasses.dataclass(frozen=True)

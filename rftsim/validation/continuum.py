@@ -12,15 +12,15 @@ from typing import Any, Final
 import numpy as np
 from rftsim_mpm.campaign import DATA, results
 from rftsim_mpm.intruders import intruder
+from rftsim_mpm.reading import limit
 
 from rftsim.fit.generic import Settings
 from rftsim.fit.plates import read_campaign
 from rftsim.fit.report import report
 from rftsim.laws import Law, fitted_law, get_law
 from rftsim.rigid import surface_force
-from rftsim.sand import ALPHA_Z_PLATE, Sand
+from rftsim.sand import ALPHA_Z_PLATE, Sand, xi_n_from_table
 from rftsim.surface import Array, make_surface
-from rftsim.tables import TABLE_C1
 from rftsim.validation.study import Measured, Request, Row, at_most, near
 
 RHO: Final = 3000.0
@@ -82,7 +82,7 @@ def solids(map_: Path, folder: Path) -> list[dict[str, Any]]:
     laws: dict[str, tuple[Law, float]] = {
         "own": (fitted_law(own.generic.table), own.generic.xi_n),
         "scaled": (get_law("rft3d"), own.generic.xi_n),
-        "source": (get_law("rft3d"), float(np.interp(0.4, *np.array(TABLE_C1).T))),
+        "source": (get_law("rft3d"), xi_n_from_table(RHO, 0.4)),
     }
     found = []
     for one in results(folder):
@@ -157,16 +157,15 @@ def _alpha(flats: list[dict[str, float]], mu: float, early: float) -> tuple[Arra
     return cells, alpha
 
 
-def limit(cells: Array, alpha: Array) -> float:
-    """Of vanishing cells, by an error of first order."""
-    return float(np.polyfit(1.0 / cells[-2:], alpha[-2:], 1)[1])
+def _limit(cells: Array, alpha: Array) -> float:
+    return float(limit(alpha[-2], alpha[-1], cells[-1] / cells[-2]))
 
 
 def _flat_rows(flats: list[dict[str, float]]) -> list[Row]:
     table = []
     for mu in sorted({one["mu_int"] for one in flats}):
-        printed = float(np.interp(mu, *np.array(TABLE_C1).T)) * 1e-6
-        xi_n = limit(*_alpha(flats, mu, 0.0)) / ALPHA_Z_PLATE * 1e-6
+        printed = 1e-6 * xi_n_from_table(RHO, mu)
+        xi_n = _limit(*_alpha(flats, mu, 0.0)) / ALPHA_Z_PLATE * 1e-6
         cells, alpha = _alpha(flats, mu, 1.0)
         early = alpha[0] / ALPHA_Z_PLATE * 1e-6
         source = "[Agarwal] Table C.1"
@@ -175,7 +174,7 @@ def _flat_rows(flats: list[dict[str, float]]) -> list[Row]:
                  unit="MN/m³", note=REASON),
             near(f"the same, contact a cell early, {cells[0]:g} cells", early, printed, 0.1 * printed, source,
                  unit="MN/m³"),
-            near("the same, contact a cell early, in its limit", limit(cells, alpha) / ALPHA_Z_PLATE * 1e-6, xi_n,
+            near("the same, contact a cell early, in its limit", _limit(cells, alpha) / ALPHA_Z_PLATE * 1e-6, xi_n,
                  0.15 * xi_n, "the limit above", unit="MN/m³"),
         ]  # fmt: skip
     return table
@@ -210,9 +209,9 @@ def _draw_flat(axis: Any, flats: list[dict[str, float]]) -> None:
             style = {"color": f"C{k}", "fillstyle": "none" if early else "full"}
             label = f"μ_int {mu:g}" + (", contact a cell early" if early else "")
             axis.plot(1.0 / cells, 1e-6 * alpha / ALPHA_Z_PLATE, mark, label=label, **style)
-            ends = np.array([limit(cells, alpha), alpha[0]]) / ALPHA_Z_PLATE
+            ends = np.array([_limit(cells, alpha), alpha[0]]) / ALPHA_Z_PLATE
             axis.plot([0.0, 1.0 / cells[0]], 1e-6 * ends, ":", color=f"C{k}")
-        axis.axhline(float(np.interp(mu, *np.array(TABLE_C1).T)) * 1e-6, color=f"C{k}", lw=0.8)
+        axis.axhline(1e-6 * xi_n_from_table(RHO, mu), color=f"C{k}", lw=0.8)
     axis.set_xlabel("cell over the plate's length [-]")
     axis.set_ylabel("ξ_n of a flat plate [MN/m³]; lines: Table C.1")
     axis.set_xlim(0.0)

@@ -21,7 +21,7 @@ from rftsim_mpm.cases import (
     shear_zone,
 )
 from rftsim_mpm.cli.study import Group, StudyCommand
-from rftsim_mpm.follow import Watch
+from rftsim_mpm.simulation import Watch
 
 
 class CaseOne(StudyCommand[CylinderDrag, CylinderForces]):

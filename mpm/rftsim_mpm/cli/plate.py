@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 
 from rftsim_mpm.cli.study import StudyCommand, with_last_frame
 from rftsim_mpm.fields import Frame
-from rftsim_mpm.follow import Watch
 from rftsim_mpm.plate import Array, Plate, PlateForce, extrapolated, finer, measure
+from rftsim_mpm.simulation import Watch
 
 
 class Pushed(NamedTuple):

@@ -9,7 +9,8 @@ import numpy as np
 from rftsim_mpm.cli.study import StudyCommand
 from rftsim_mpm.collapse import Collapse, Runout, exponent, fall
 from rftsim_mpm.drag import Drag, DragForces, drag
-from rftsim_mpm.follow import Watch, part
+from rftsim_mpm.follow import part
+from rftsim_mpm.simulation import Watch
 from rftsim_mpm.wheel import Rolling, Wheel, roll
 
 

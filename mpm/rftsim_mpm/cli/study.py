@@ -14,9 +14,8 @@ from rich.console import Console
 from rftsim_mpm.cli.report import print_json, progress
 from rftsim_mpm.errors import MpmError
 from rftsim_mpm.fields import Camera, Frame
-from rftsim_mpm.follow import Watch
 from rftsim_mpm.output import check_writable, replacing
-from rftsim_mpm.simulation import Simulation
+from rftsim_mpm.simulation import Simulation, Watch
 
 Study = TypeVar("Study")
 Found = TypeVar("Found")
