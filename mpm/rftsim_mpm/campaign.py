@@ -1,4 +1,4 @@
-"""A grid of plates or pushes as independent jobs: one result file each, written whole or not at all.
+"""A grid of plates, pushes or wheels as independent jobs: one result file each, written whole or not at all.
 
 A campaign is a folder: `manifest.json` says what belongs to it, `results/KEY.json` holds one job's result with its
 own checksum, KEY being made from the job. What is there and whole is never computed again, so a campaign that was
@@ -20,23 +20,19 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
-
-from rftsim_mpm import plate, push
+from rftsim_mpm import plate, push, wheel
 from rftsim_mpm.errors import MpmError
 from rftsim_mpm.output import replacing
 from rftsim_mpm.plate import Plate
 from rftsim_mpm.push import Push
-from rftsim_mpm.reading import History
+from rftsim_mpm.wheel import Wheel
 
-Job = Plate | Push
-KINDS: dict[str, type[Job]] = {"plates": Plate, "pushes": Push}
+Job = Plate | Push | Wheel
+KINDS: dict[str, type[Job]] = {"plates": Plate, "pushes": Push, "wheels": Wheel}
 """By what they are called in files."""
 
 DATA = Path(__file__).parent / "data"
-"""Campaigns that are shipped: `plates`, `flat` and `solids`."""
-POINTS = 100
-"""Points of the force's history that a result keeps."""
+"""Campaigns that are shipped: `plates`, `flat`, `solids`, `rates` and `wheels`."""
 
 
 class Status(NamedTuple):
@@ -48,7 +44,7 @@ class Status(NamedTuple):
 
 
 def read_jobs(path: Path) -> list[Job]:
-    """What a TOML file asks for: each list under `[[plates]]` or `[[pushes]]` is an axis of a grid.
+    """What a TOML file asks for: each list under `[[plates]]`, `[[pushes]]` or `[[wheels]]` is an axis of a grid.
 
     `[defaults]` holds for all.
 
@@ -65,7 +61,7 @@ def read_jobs(path: Path) -> list[Job]:
     grids = [(name, grid) for name in KINDS if isinstance(text.get(name), list) for grid in text[name]]
     if not isinstance(defaults, dict) or not grids or set(text) - set(KINDS):
         raise MpmError(
-            f"{path} must have one or more [[plates]] or [[pushes]], and may have [defaults], and nothing else"
+            f"{path} must have one or more [[{']] or [['.join(KINDS)}]], and may have [defaults], and nothing else"
         )
     found: dict[str, Job] = {}
     for name, grid in grids:
@@ -164,7 +160,7 @@ def _name(job: Job) -> str:
 
 
 def results(folder: Path) -> list[dict[str, Any]]:
-    """Every finished result: `plate` or `push`, and what the command of that name reports of it."""
+    """Every finished result: `plate`, `push` or `wheel`, and what the command of that name reports of it."""
     names = set(status(folder).finished)
     return [json.loads((folder / "results" / f"{name}.json").read_text()) for name in sorted(names)]
 
@@ -176,21 +172,16 @@ def _checksum(value: Any) -> str:
 def compute(job: Job, beat: Callable[[], None] | None = None) -> dict[str, Any]:
     """One result; `beat` is called at every step."""
     watch = None if beat is None else lambda sim, share: beat()
-    found = push.measure(job, watch) if isinstance(job, Push) else plate.measure(job, watch)
-    result = {
-        _name(job): dataclasses.asdict(job),
-        **found.report,
-        **_thinned(found.history),
-    }
+    found: plate.PlateForce | push.PushForce | wheel.Rolling
+    match job:
+        case Plate():
+            found = plate.measure(job, watch)
+        case Push():
+            found = push.measure(job, watch)
+        case Wheel():
+            found = wheel.roll(job, watch)
+    result = {_name(job): dataclasses.asdict(job), **found.report, **found.series}
     return {**result, "sha256": _checksum(result)}
-
-
-def _thinned(history: History) -> dict[str, Any]:
-    some = np.linspace(0, len(history.travel) - 1, min(POINTS, len(history.travel))).astype(int)
-    return {
-        "travel_m": [float(f"{x:.6g}") for x in history.travel[some]],
-        "history": [[float(f"{x:.5g}") for x in row] for row in history.force[some]],
-    }
 
 
 def write(folder: Path, name: str, result: dict[str, Any]) -> None:

@@ -33,6 +33,8 @@ class Drag:
     """Of the plate's centre [m]."""
     speeds: tuple[float, ...] = (0.1, 0.32, 0.64)
     """[m/s]."""
+    travel: float = 2.5
+    """Before the reading [plate lengths]; a fast plate then heaps up sand ahead, and feels more and more."""
     cells: float = 10.0
     """Cells per plate length."""
 
@@ -52,7 +54,7 @@ class Drag:
                 speed=speed,
                 cells=self.cells,
                 bed=2.5,
-                buried=2.5,
+                buried=self.travel,
             )
             for depth in self.depths
             for speed in self.speeds

@@ -192,6 +192,11 @@ class PlateForce(NamedTuple):
             "seconds": round(self.seconds, 2),
         }
 
+    @property
+    def series(self) -> dict[str, Any]:
+        """What files keep of the way."""
+        return self.history.series
+
 
 def course(plate: Plate) -> Course:
     """The plate's way."""

@@ -94,6 +94,11 @@ class PushForce(NamedTuple):
             "seconds": round(self.seconds, 2),
         }
 
+    @property
+    def series(self) -> dict[str, Any]:
+        """What files keep of the way."""
+        return self.history.series
+
 
 def course(push: Push, shape: Shape) -> Course:
     """The solid's way."""

@@ -1,6 +1,6 @@
 """Forces read from a run: averages over half a millisecond, a straight line through a window, and what is left over."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,8 @@ Array = NDArray[np.float64]
 
 AVERAGE = 0.5e-3
 """Length of the averages [s]."""
+POINTS = 100
+"""Points of a history that files keep."""
 
 
 class History(NamedTuple):
@@ -24,6 +26,18 @@ class History(NamedTuple):
     """Of the sand on the body, (n, dim) [N, in the plane N/m]."""
     moment: Array
     """About the body's origin, (n, 1 or 3) [N m]."""
+
+    @property
+    def series(self) -> dict[str, Any]:
+        """What files keep of it."""
+        return thinned(travel_m=self.travel, history=self.force)
+
+
+def thinned(**columns: Array) -> dict[str, Any]:
+    """At most POINTS rows of each, to five digits."""
+    count = len(next(iter(columns.values())))
+    some = np.linspace(0, count - 1, min(POINTS, count)).astype(int)
+    return {name: np.vectorize(lambda x: float(f"{x:.5g}"))(column[some]).tolist() for name, column in columns.items()}
 
 
 class Reading(NamedTuple):

@@ -2,17 +2,21 @@
 
 import dataclasses
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rftsim_mpm.bed import level_bed
 from rftsim_mpm.body import Body
 from rftsim_mpm.errors import MpmError
 from rftsim_mpm.follow import Track, follow
 from rftsim_mpm.material import Material, stiffness
+from rftsim_mpm.reading import thinned
 from rftsim_mpm.shapes import wheel
 from rftsim_mpm.simulation import Simulation, Watch
+
+Array = NDArray[np.float64]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -48,6 +52,8 @@ class Wheel:
     """Critical density of the sand, 1100 x 0.58 [kg/m^3]."""
     dx: float = 0.004
     """Size of a cell [m]; a grouser must be more than a cell wide."""
+    xpic: int = 0
+    """Order of XPIC; 0 is FLIP."""
     gravity: float = 9.81
     """[m/s^2]."""
 
@@ -61,9 +67,15 @@ class Wheel:
                 raise MpmError(f"{name} must be positive and finite, not {getattr(self, name):g}")
         if self.grousers < 2 or self.grousers * self.width >= 2.0 * math.pi * self.radius:
             raise MpmError(f"{self.grousers} grousers of {self.width:g} m do not fit on the wheel; 2 at least")
-
+        if self.xpic < 0:
+            raise MpmError(f"xpic must be zero or more, not {self.xpic}")
         if self.width < 1.06 * self.dx:
             raise MpmError(f"grousers {self.width:g} m wide are too thin for cells of {self.dx:g} m: use smaller ones")
+
+    @property
+    def quick(self) -> "Wheel":
+        """The same with coarser cells, and shorter: a look, not a measurement."""
+        return dataclasses.replace(self, dx=min(1.25 * self.dx, self.width / 1.06), duration=min(self.time, 0.5))
 
     @property
     def outer(self) -> float:
@@ -87,7 +99,31 @@ class Rolling(NamedTuple):
     """1 - v / (omega r), r with grousers [-]."""
     drop: float
     """How much lower the surface is behind the wheel than ahead at the end [m]."""
+    drift: float
+    """Change of the speed over that time, relative: how far from steady the wheel still is [-]."""
+    time: Array
+    """Of the whole run, (n,) [s]."""
+    speeds: Array
+    """(n,) [m/s]."""
+    sinkages: Array
+    """(n,) [m]."""
     track: Track
+
+    @property
+    def report(self) -> dict[str, Any]:
+        """What files keep of the means."""
+        return {
+            "speed_m_s": self.speed,
+            "sinkage_m": self.sinkage,
+            "slip": self.slip,
+            "surface_drop_m": self.drop,
+            "drift": self.drift,
+        }
+
+    @property
+    def series(self) -> dict[str, Any]:
+        """What files keep of the run."""
+        return thinned(time_s=self.time, speeds_m_s=self.speeds, sinkages_m=self.sinkages)
 
 
 def roll(study: Wheel, watch: Watch | None = None) -> Rolling:
@@ -117,12 +153,14 @@ def roll(study: Wheel, watch: Watch | None = None) -> Rolling:
         bodies=[body],
         gravity=study.gravity,
         wall_friction=study.mu_int,
+        xpic=study.xpic,
     )
     sim.clear_bodies()
     track = follow(sim, study.time, watch)
-    steady = track.after(0.6 * study.time)
-    speed = float(np.mean(steady.velocity[:, 0, 0]))
-    sinkage = depth + outer - float(np.mean(steady.position[:, 0, 1]))
+    speeds, sinkages = track.velocity[:, 0, 0], depth + outer - track.position[:, 0, 1]
+    late = track.time >= 0.6 * study.time
+    speed, sinkage = float(speeds[late].mean()), float(sinkages[late].mean())
+    slope = float(np.polyfit(track.time[late], speeds[late], 1)[0])
     surface, middle = track.frames[-1].surface, float(body.position[0])
     way = math.copysign(1.0, omega)
     behind, ahead = (
@@ -130,4 +168,5 @@ def roll(study: Wheel, watch: Watch | None = None) -> Rolling:
         for s in (-1.0, 1.0)
     )
     drop = float(ahead[:, 1].mean() - behind[:, 1].mean())
-    return Rolling(speed, sinkage, 1.0 - speed / (omega * outer), drop, track)
+    slip, drift = 1.0 - speed / (omega * outer), 0.4 * study.time * slope / speed
+    return Rolling(speed, sinkage, slip, drop, drift, track.time, speeds, sinkages, track)

@@ -64,7 +64,7 @@ class CampaignRun:
     """
 
     file: Folder
-    """TOML: [[plates]] or [[pushes]] whose lists are the axes of a grid, and [defaults] for all."""
+    """TOML: [[plates]], [[pushes]] or [[wheels]] whose lists are the axes of a grid, and [defaults] for all."""
     folder: Folder
     """Where manifest.json and results/ go."""
     work: tyro.conf.OmitArgPrefixes[Work] = dataclasses.field(default_factory=Work)

@@ -63,34 +63,26 @@ class WheelCommand(StudyCommand[Wheel, Rolling]):
     title = "wheel"
 
     def _quicker(self) -> Wheel:
-        return dataclasses.replace(self.study, dx=0.005, duration=min(self.study.time, 0.5))
+        return self.study.quick
 
     def _run(self, study: Wheel, watch: Watch) -> Rolling:
         return roll(study, watch)
 
     def _report(self, study: Wheel, found: Rolling) -> dict[str, Any]:
-        return {
-            "speed_m_s": found.speed,
-            "speed_over_sqrt_gl": found.speed / _root(study),
-            "sinkage_m": found.sinkage,
-            "slip": found.slip,
-            "surface_drop_m": found.drop,
-        }
+        return found.report | {"speed_over_sqrt_gl": found.speed / _root(study)}
 
     def _lines(self, study: Wheel, found: Rolling) -> list[str]:
         scaled = found.speed / _root(study)
         return [
-            f"{study.rpm:g} RPM: {found.speed:.4f} m/s, {scaled:.3f} sqrt(g l), slip {found.slip:.3f}",
+            f"{study.rpm:g} RPM: {found.speed:.4f} m/s, {scaled:.3f} sqrt(g l), slip {found.slip:.3f}; "
+            f"over that time the speed changes by {100 * found.drift:.0f} %",
             f"sinkage {1e3 * found.sinkage:.1f} mm; behind, the surface is {1e3 * found.drop:.1f} mm lower than ahead",
         ]
 
     def _draw(self, study: Wheel, found: Rolling, path: Path) -> None:
         from rftsim_mpm.plots import plot_wheel
 
-        track = found.track
-        level = found.sinkage + float(track.after(0.6 * study.time).position[:, 0, 1].mean())
-        height = level - track.position[:, 0, 1]
-        plot_wheel(track.time, track.velocity[:, 0, 0], height, track.frames[-1], f"wheel, {study.rpm:g} RPM", path)
+        plot_wheel(found.time, found.speeds, found.sinkages, found.track.frames[-1], f"wheel, {study.rpm:g} RPM", path)
 
 
 def _root(study: Wheel) -> float:
