@@ -4,15 +4,13 @@ Computes no continuum: reads the campaigns in `rftsim_mpm/data`, which say by wh
 """
 
 import functools
-import hashlib
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from rftsim_mpm.campaign import DATA, results
+from rftsim_mpm.campaign import DATA
 from rftsim_mpm.intruders import intruder
-from rftsim_mpm.reading import limit
+from rftsim_mpm.reading import limit as limit_of
 
 from rftsim.fit.generic import Settings
 from rftsim.fit.plates import read_campaign
@@ -21,6 +19,7 @@ from rftsim.laws import Law, fitted_law, get_law
 from rftsim.rigid import surface_force
 from rftsim.sand import ALPHA_Z_PLATE, Sand, xi_n_from_table
 from rftsim.surface import Array, make_surface
+from rftsim.validation.shipped import Results, found, shipped
 from rftsim.validation.study import Measured, Request, Row, at_most, near
 
 RHO: Final = 3000.0
@@ -30,62 +29,46 @@ REASON: Final = "Table C.1 has contact a cell early, see the rows below"
 
 def jobs(request: Request) -> dict[str, Callable[[], Any]]:
     """One for each campaign that is there."""
-    known: dict[str, Callable[[Path], Any]] = {
-        "flat": flat,
-        "plates": plates,
-        "solids": functools.partial(solids, DATA / "plates"),
-    }
-    return {
-        f"{name}/{_content(DATA / name)}": functools.partial(job, DATA / name)
-        for name, job in known.items()
-        if (DATA / name / "manifest.json").exists()
-    }
+    return shipped("flat", flat) | shipped("plates", lambda _: plates()) | shipped("solids", solids)
 
 
-def _content(folder: Path) -> str:
-    """A hash of a campaign's results."""
-    texts = [path.read_bytes() for path in sorted((folder / "results").glob("*.json"))]
-    return hashlib.sha256(b"".join(texts)).hexdigest()[:12]
-
-
-def flat(folder: Path) -> list[dict[str, float]]:
+def flat(results: Results) -> list[dict[str, float]]:
     """Flat plates pushed down: mu_int, early, cells, alpha_z."""
-    found = results(folder)
     keys = ("mu_int", "early", "cells")
-    return [{name: one["plate"][name] for name in keys} | {"alpha_z": one["alpha_N_m3"][2]} for one in found]
+    return [{name: one["plate"][name] for name in keys} | {"alpha_z": one["alpha_N_m3"][2]} for one in results]
 
 
-def plates(folder: Path) -> dict[str, Any]:
+def plates() -> dict[str, Any]:
     """3D-RFT's cubic fitted to the map, and what it and the source's table miss."""
-    found = _fitted(folder)
+    fit = _fitted()
     return {
-        "n": found.plates.n,
-        "xi_n": found.generic.xi_n,
-        "power": found.power,
-        "fitted": found.fitted.relative,
-        "held_back": found.held_back.relative,
-        "source": found.source.relative,
-        "measured": (found.plates.alpha / found.generic.xi_n).tolist(),
-        "predicted": (found.predicted_held_back / found.generic.xi_n).tolist(),
+        "n": fit.plates.n,
+        "xi_n": fit.generic.xi_n,
+        "power": fit.power,
+        "fitted": fit.fitted.relative,
+        "held_back": fit.held_back.relative,
+        "source": fit.source.relative,
+        "measured": (fit.plates.alpha / fit.generic.xi_n).tolist(),
+        "predicted": (fit.predicted_held_back / fit.generic.xi_n).tolist(),
     }
 
 
 @functools.cache
-def _fitted(folder: Path) -> Any:
-    campaign = read_campaign(folder, {"mu_int": 0.4, "mu_surf": 0.4})
+def _fitted() -> Any:
+    campaign = read_campaign(DATA / "plates", {"mu_int": 0.4, "mu_surf": 0.4})
     return report(campaign.plates, Settings(3, dissipative=True), 0.4, choose_prior=True)
 
 
-def solids(map_: Path, folder: Path) -> list[dict[str, Any]]:
+def solids(results: Results) -> list[dict[str, Any]]:
     """Solids in deep sand: measured force, and that of three laws [N]."""
-    own = _fitted(map_)
+    own = _fitted()
     laws: dict[str, tuple[Law, float]] = {
         "own": (fitted_law(own.generic.table), own.generic.xi_n),
         "scaled": (get_law("rft3d"), own.generic.xi_n),
         "source": (get_law("rft3d"), xi_n_from_table(RHO, 0.4)),
     }
-    found = []
-    for one in results(folder):
+    table = []
+    for one in results:
         push = one["push"]
         shape = intruder(push["shape"])
         theta = np.radians(push["theta"])
@@ -95,15 +78,22 @@ def solids(map_: Path, folder: Path) -> list[dict[str, Any]]:
             sand, motion = Sand(xi_n=xi_n, mu_surf=push["mu_surf"]), (np.cos(theta), 0.0, -np.sin(theta))
             state = surface_force(surface, sand, law, position=(0, 0, -push["depth"]), velocity=motion)
             forces[name] = state.force.tolist()
-        found.append({"shape": push["shape"], "theta": push["theta"], "continuum": one["force"], **forces})
-    return found
+        kept = {name: push[name] for name in ("shape", "theta", "dx")}
+        table.append({**kept, "continuum": one["force"], **forces})
+    return table
 
 
-def missed(found: list[dict[str, Any]], law: str) -> dict[str, list[float]]:
+def _by_cells(solids: list[dict[str, Any]]) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+    """Those in the cells that most have, and those in finer ones."""
+    coarse = max(one["dx"] for one in solids)
+    return [one for one in solids if one["dx"] == coarse], [one for one in solids if one["dx"] < coarse]
+
+
+def missed(solids: list[dict[str, Any]], law: str) -> dict[str, list[float]]:
     """|F - F'| over the largest |F| of the shape, by shape."""
     off: dict[str, list[float]] = {}
-    for shape in dict.fromkeys(one["shape"] for one in found):
-        own = [one for one in found if one["shape"] == shape]
+    for shape in dict.fromkeys(one["shape"] for one in solids):
+        own = [one for one in solids if one["shape"] == shape]
         largest = max(float(np.linalg.norm(one["continuum"])) for one in own)
         off[shape] = [float(np.linalg.norm(np.subtract(one[law], one["continuum"]))) / largest for one in own]
     return off
@@ -111,42 +101,42 @@ def missed(found: list[dict[str, Any]], law: str) -> dict[str, list[float]]:
 
 def rows(measured: Measured) -> list[Row]:
     """What the source's tables are against the continuum, and what a fit to the continuum is."""
-    found = {name.partition("/")[0]: value for name, value in measured.items()}
-    table: list[Row] = []
-    if "flat" in found:
-        table += _flat_rows(found["flat"])
-    if "plates" in found:
-        one = found["plates"]
+    table = _flat_rows(found(measured, "flat") or [])
+    if one := found(measured, "plates"):
         what = f"{one['n']} plates over β, γ, ψ"
         table += [
             Row(f"{what}: error of Table C.3, scaled", 100 * one["source"], "our continuum", unit="%"),
             at_most(f"{what}: of our cubic, held back", 100 * one["held_back"], 10.0, "our continuum", unit="%"),
             at_most("our cubic: largest power α·v over ξ_n", one["power"], 0.0, "dissipative by constraint"),
         ]
+    if pushed := found(measured, "solids"):
+        table += _solid_rows(*_by_cells(pushed))
+    return table
+
+
+def _solid_rows(solids: list[dict[str, Any]], finer: list[dict[str, Any]]) -> list[Row]:
+    table = []
     names = {"own": "our cubic", "scaled": "Table C.3, our ξ_n", "source": "Table C.3, Table C.1's ξ_n"}
     for law, name in names.items():
-        if not found.get("solids"):
-            break
-        off = missed(found["solids"], law)
+        off = missed(solids, law)
         every = [x for own in off.values() for x in own]
         worst = max(off, key=lambda shape: float(np.median(off[shape])))
-        source = f"our continuum, {len(off)} of 10 solids, {len(every)} directions so far"
-        table += [
-            at_most(
-                f"solids: {name}: median error over the largest force",
-                100 * float(np.median(every)),
-                15.0,
-                source,
-                unit="%",
-            ),
-            at_most(
-                f"solids: {name}: the same of the worst, {worst}",
-                100 * float(np.median(off[worst])),
-                25.0,
-                source,
-                unit="%",
-            ),
-        ]
+        source = f"our continuum, {len(off)} solids, {len(every)} directions"
+        for what, some, limit in (
+            ("median error over the largest force", every, 15.0),
+            (f"the same of the worst, {worst}", off[worst], 25.0),
+        ):
+            table.append(at_most(f"solids: {name}: {what}", 100 * float(np.median(some)), limit, source, unit="%"))
+    coarse = {(one["shape"], one["theta"]): np.array(one["continuum"]) for one in solids}
+    for one in finer:
+        fine, before, ratio = (
+            np.array(one["continuum"]),
+            coarse[one["shape"], one["theta"]],
+            solids[0]["dx"] / one["dx"],
+        )
+        off_limit = np.linalg.norm(before - limit_of(before, fine, ratio)) / np.linalg.norm(before)
+        what = f"continuum: {one['shape']} at θ {one['theta']:g}°: force's distance to the limit of vanishing cells"
+        table.append(Row(what, 100 * float(off_limit), f"its force in cells {ratio:g} times smaller", unit="%"))
     return table
 
 
@@ -158,7 +148,7 @@ def _alpha(flats: list[dict[str, float]], mu: float, early: float) -> tuple[Arra
 
 
 def _limit(cells: Array, alpha: Array) -> float:
-    return float(limit(alpha[-2], alpha[-1], cells[-1] / cells[-2]))
+    return float(limit_of(alpha[-2], alpha[-1], cells[-1] / cells[-2]))
 
 
 def _flat_rows(flats: list[dict[str, float]]) -> list[Row]:
@@ -182,21 +172,21 @@ def _flat_rows(flats: list[dict[str, float]]) -> list[Row]:
 
 def draw(measured: Measured, figure: Any) -> None:
     """Flat plates over cell size, the map, and the solids: predicted over measured."""
-    found = {name.partition("/")[0]: value for name, value in measured.items()}
-    axes = figure.subplots(1, 3 if found.get("solids") else 2)
-    if "flat" in found:
-        _draw_flat(axes[0], found["flat"])
-    if "plates" in found:
-        one = found["plates"]
+    pushed = found(measured, "solids")
+    axes = figure.subplots(1, 3 if pushed else 2)
+    if flats := found(measured, "flat"):
+        _draw_flat(axes[0], flats)
+    if one := found(measured, "plates"):
         for k, name in enumerate("xyz"):
             axes[1].plot(
                 np.array(one["measured"])[:, k], np.array(one["predicted"])[:, k], ".", label=f"$\\alpha_{name}$"
             )
         _diagonal(axes[1], "α/ξ_n of the continuum [-]", "of our cubic, each plate held back [-]")
-    if found.get("solids"):
+    if pushed:
+        solids, _ = _by_cells(pushed)
         for k, name in enumerate("xz"):
             for law, mark in (("own", "o"), ("source", "x")):
-                some = [(one["continuum"][2 * k], one[law][2 * k]) for one in found["solids"]]
+                some = [(one["continuum"][2 * k], one[law][2 * k]) for one in solids]
                 label = f"$F_{name}$, {'our cubic' if law == 'own' else 'Tables C.1, C.3'}"
                 axes[2].plot(*np.array(some).T, mark, color=f"C{k}", fillstyle="none", label=label)
         _diagonal(axes[2], "force of the continuum on solids [N]", "force of 3D-RFT [N]")

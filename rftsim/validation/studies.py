@@ -10,7 +10,7 @@ import rftsim_models
 import rftsim
 from rftsim.errors import RftsimError
 from rftsim.kept import Kept
-from rftsim.validation import continuum, drill, measured, plates, runner, scaling, wheel
+from rftsim.validation import continuum, drill, measured, motion, plates, runner, scaling, wheel
 from rftsim.validation.study import Measured, Request, Row, Study
 
 STUDIES: Final = {
@@ -32,11 +32,19 @@ STUDIES: Final = {
         continuum.draw,
         (15.0, 5.0),
     ),
+    "motion": Study(
+        "dynamic laws against plates at speed and wheels of the material point method",
+        motion,
+        motion.jobs,
+        motion.rows,
+        motion.draw,
+        (15.0, 4.8),
+    ),
 }
 """Every study by name."""
 
 
-SHARED: Final = ("balance", "cmu", "pockets", "terramechanics")
+SHARED: Final = ("balance", "cmu", "pockets", "shipped", "terramechanics")
 """Modules that studies compute with."""
 
 
