@@ -1,8 +1,9 @@
-"""Columns of numbers from a CSV file."""
+"""Columns of a CSV file."""
 
 import csv
 import math
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,8 +11,28 @@ from rftsim.errors import RftsimError
 from rftsim.surface import Array
 
 
+class Columns(NamedTuple):
+    """Columns by name."""
+
+    numbers: dict[str, Array]
+    words: dict[str, list[str]]
+
+
 def read_columns(path: Path, needed: tuple[str, ...], optional: tuple[str, ...] = ()) -> dict[str, Array]:
+    """Columns of numbers, see `read_table`."""
+    return read_table(path, needed, optional).numbers
+
+
+def read_table(
+    path: Path, needed: tuple[str, ...], optional: tuple[str, ...] = (), words: tuple[str, ...] = ()
+) -> Columns:
     """Columns of a CSV by the names in its first line; lines that start with # are passed over.
+
+    Args:
+        path: The file.
+        needed: Columns of numbers that must be there.
+        optional: Columns of numbers that may be.
+        words: Columns of text that must be there.
 
     Raises:
         RftsimError: The file is missing or holds no rows, a column is missing, or an entry is no finite number.
@@ -25,12 +46,12 @@ def read_columns(path: Path, needed: tuple[str, ...], optional: tuple[str, ...] 
     numbered = [(i, line) for i, line in enumerate(lines, 1) if line.strip() and not line.startswith("#")]
     rows = list(csv.reader((line for _, line in numbered), skipinitialspace=True))
     names = [name.strip() for name in rows[0]] if rows else []
-    for name in needed:
+    for name in (*words, *needed):
         if name not in names:
             raise RftsimError(f"{path} has no column {name!r}; it has {', '.join(names) or 'none'}")
     if len(rows) < 2:
         raise RftsimError(f"{path} has no rows")
-    found = {}
+    found = Columns({}, {name: [row[names.index(name)].strip() for row in rows[1:]] for name in words})
     for name in (name for name in (*needed, *optional) if name in names):
         at = names.index(name)
         column = [
@@ -38,7 +59,7 @@ def read_columns(path: Path, needed: tuple[str, ...], optional: tuple[str, ...] 
             for (i, _), row in zip(numbered, rows, strict=True)
             if i > numbered[0][0]
         ]
-        found[name] = np.array(column)
+        found.numbers[name] = np.array(column)
     return found
 
 

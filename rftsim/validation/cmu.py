@@ -1,6 +1,5 @@
 """Reading the measurements of Pavlov and Johnson, CMU "3d-terramechanics" (MIT licence): a wheel, and plates."""
 
-import csv
 import hashlib
 import math
 from pathlib import Path
@@ -9,6 +8,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from rftsim.errors import RftsimError
+from rftsim.fit.columns import read_columns, read_table
 from rftsim.surface import Array
 
 WHEEL_FILE: Final = "cmu_wheel_grouser.csv"
@@ -61,8 +61,8 @@ def read_runs(path: Path) -> Runs:
         RftsimError: The file lacks a column, or a number.
     """
     names = ("slip_ratio", "slip_angle_deg", "travel_speed_mm_s", "rim_speed_mm_s", "sinkage_mm")
-    columns = _columns(path, (), (*names, "F_drawbar_N", "F_sidewall_N", "F_load_N"))
-    slip, angle, travel, rim, sinkage, *force = (np.array(column) for column in columns.values())
+    columns = read_columns(path, (*names, "F_drawbar_N", "F_sidewall_N", "F_load_N"))
+    slip, angle, travel, rim, sinkage, *force = columns.values()
     return Runs(slip, np.radians(angle), travel / 1e3, rim / 1e3, sinkage / 1e3, np.column_stack(force))
 
 
@@ -72,9 +72,9 @@ def read_plates(path: Path) -> list[PlateTest]:
     Raises:
         RftsimError: The file lacks a column, a number, or a second size of plate.
     """
-    columns = _columns(path, ("box", "trial"), ("plate_diameter_mm", "depth_m", "force_N"))
-    labels = list(zip(columns["box"], columns["trial"], columns["plate_diameter_mm"], strict=True))
-    depth, force = np.array(columns["depth_m"]), np.array(columns["force_N"])
+    numbers, words = read_table(path, ("plate_diameter_mm", "depth_m", "force_N"), words=("box", "trial"))
+    labels = list(zip(words["box"], words["trial"], numbers["plate_diameter_mm"], strict=True))
+    depth, force = numbers["depth_m"], numbers["force_N"]
     tests = []
     for label in dict.fromkeys(labels):
         own = np.array([other == label for other in labels])
@@ -87,18 +87,3 @@ def read_plates(path: Path) -> list[PlateTest]:
 def digest(path: Path) -> str:
     """Of a file's content."""
     return hashlib.sha256(path.read_bytes()).hexdigest()[:12]
-
-
-def _columns(path: Path, words: tuple[str, ...], numbers: tuple[str, ...]) -> dict[str, list[float | str]]:
-    with path.open(newline="") as file:
-        lines = list(csv.DictReader(file))
-    if not lines:
-        raise RftsimError(f"{path} has no rows")
-    for name in (*words, *numbers):
-        if name not in lines[0]:
-            raise RftsimError(f"{path} has no column {name}")
-    try:
-        columns: dict[str, list[float | str]] = {name: [float(line[name]) for line in lines] for name in numbers}
-    except (ValueError, TypeError) as error:
-        raise RftsimError(f"{path} has something that is no number: {error}") from error
-    return columns | {name: [line[name] for line in lines] for name in words}

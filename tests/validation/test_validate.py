@@ -16,6 +16,12 @@ from rftsim.validation.study import Row, at_least, at_most, near
 README = Path(__file__).parents[2] / "README.md"
 
 
+WHEEL_COLUMNS = (
+    "slip_ratio", "slip_angle_deg", "travel_speed_mm_s", "rim_speed_mm_s", "sinkage_mm",
+    "F_drawbar_N", "F_sidewall_N", "F_load_N",
+)  # fmt: skip
+
+
 def call(capsys, *arguments):
     """Exit code, standard output and standard error of one command."""
     code = 0
@@ -126,8 +132,8 @@ def test_a_failing_row_is_marked_and_ends_with_1(capsys, tmp_path):
 @pytest.mark.parametrize(
     ("name", "text", "words"),
     [
-        (WHEEL_FILE, "slip_ratio\n0.1\n", "has no column slip_angle_deg"),
-        (WHEEL_FILE, "slip_ratio\n", "has no rows"),
+        (WHEEL_FILE, "slip_ratio\n0.1\n", "has no column 'slip_angle_deg'"),
+        (WHEEL_FILE, f"{','.join(WHEEL_COLUMNS)}\n", "has no rows"),
         (PLATE_FILE, "box,trial,plate_diameter_mm,depth_m,force_N\na,b,60,0.01,much\n", "is no number"),
         (PLATE_FILE, "box,trial,plate_diameter_mm,depth_m,force_N\na,b,60,0.01,10\n", "plates of one size"),
     ],
