@@ -13,6 +13,7 @@ from rftsim_mpm.errors import MpmError
 from rftsim_mpm.fields import Frame
 from rftsim_mpm.follow import Track, follow, part
 from rftsim_mpm.material import Material, stiffness
+from rftsim_mpm.reading import AVERAGE
 from rftsim_mpm.shapes import box, disc
 from rftsim_mpm.simulation import Simulation, Watch
 
@@ -197,7 +198,7 @@ class PlowingForces(NamedTuple):
     """Of each packing [N/m]."""
     mean: Array
     fluctuation: Array
-    """Standard deviation about a smooth trend over the last half, after averaging over 2 mm, relative [-]."""
+    """Standard deviation about a smooth trend over the last half, after averaging over a cell, relative [-]."""
     frames: list[Frame]
 
 
@@ -214,7 +215,7 @@ def plowing(study: Plowing, watch: Watch | None = None) -> PlowingForces:
         track = follow(sim, study.travel / study.speed, part(watch, i, len(study.packings)))
         travel, force = track.time * study.speed, -track.force[:, 0, 0]
         late = travel > 0.5 * study.travel
-        window = np.ones(max(1, round(0.002 / study.speed / 0.5e-3)))
+        window = np.ones(max(1, round(study.dx / study.speed / AVERAGE)))
         smooth = np.convolve(force, window / window.size, "same")[late]
         trend = np.polyval(np.polyfit(travel[late], smooth, 2), travel[late])
         inner = slice(window.size, -window.size)
