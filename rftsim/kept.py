@@ -6,6 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from rftsim.files import replacing
+
 
 class Kept:
     """Measurements by name.
@@ -28,7 +30,6 @@ class Kept:
         """What `measure` gives, as JSON has it, measured now or before."""
         if name not in self.known:
             self.known[name] = measure()
-            temporary = self.path.with_suffix(".part")
-            temporary.write_text(json.dumps({"key": self.key, "known": self.known}))
-            temporary.replace(self.path)
+            with replacing(self.path) as temporary:
+                temporary.write_text(json.dumps({"key": self.key, "known": self.known}))
         return self.known[name]

@@ -15,8 +15,9 @@ from rich.table import Table
 from rftsim.bench import kernel
 from rftsim.bench.hard_cases import CASES, Force
 from rftsim.bench.stability import FORCES, STEPS, Row, Starts, Study, Summary, run, summarise
-from rftsim.cli.output import check_writable, print_json, replacing
+from rftsim.cli.output import print_json
 from rftsim.errors import RftsimError
+from rftsim.files import check_writable, replacing
 from rftsim.plots import plot_kernel, plot_stability
 
 

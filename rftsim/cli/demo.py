@@ -9,9 +9,10 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
-from rftsim.cli.output import check_writable, print_json, replacing
+from rftsim.cli.output import print_json
 from rftsim.demo import LAWS, RATES, Point, measure_all, points
 from rftsim.errors import RftsimError
+from rftsim.files import check_writable, replacing
 from rftsim.plots import plot_demo
 from rftsim.run import run
 from rftsim.scenes import stage

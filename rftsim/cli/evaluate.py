@@ -13,8 +13,9 @@ from rich.progress import Progress
 from rich.table import Table
 
 from rftsim.cli.extra import needing
-from rftsim.cli.output import check_writable, print_json, replacing
+from rftsim.cli.output import print_json
 from rftsim.errors import RftsimError
+from rftsim.files import check_writable, replacing
 
 if TYPE_CHECKING:
     from rftsim_envs.training.evaluate import Score

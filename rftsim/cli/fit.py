@@ -11,8 +11,9 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from rftsim.cli.output import check_writable, print_json, replacing
+from rftsim.cli.output import print_json
 from rftsim.errors import RftsimError
+from rftsim.files import check_writable, replacing
 from rftsim.fit import trials
 from rftsim.fit.generic import Settings
 from rftsim.fit.pictures import plot_map, plot_trial

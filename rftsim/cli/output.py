@@ -1,49 +1,7 @@
-"""Files that a command writes: whole, or not at all."""
+"""What a command prints for programs."""
 
-import contextlib
 import json
-import os
-import tempfile
-from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
-
-from rftsim.errors import RftsimError
-
-
-@contextlib.contextmanager
-def replacing(path: Path) -> Iterator[Path]:
-    """A temporary file beside `path` that takes its place when the block ends well.
-
-    Raises:
-        RftsimError: The folder cannot be written.
-    """
-    check_writable(path)
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}-", suffix=path.suffix)
-    os.close(handle)
-    temporary = Path(name)
-    try:
-        yield temporary
-        temporary.chmod(0o644)
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
-
-
-def check_writable(path: Path, *suffixes: str) -> None:
-    """Refuse a path whose folder is missing or not writable, or whose ending is none of `suffixes`.
-
-    Raises:
-        RftsimError: As said.
-    """
-    if suffixes and path.suffix.lower() not in suffixes:
-        raise RftsimError(f"{path} must end in {' or '.join(suffixes)}")
-    if path.is_dir():
-        raise RftsimError(f"{path} is a folder")
-    if not path.parent.is_dir():
-        raise RftsimError(f"no folder {path.parent} to write {path.name} to")
-    if not os.access(path.parent, os.W_OK):
-        raise RftsimError(f"cannot write to {path.parent}")
 
 
 def print_json(value: Any) -> None:

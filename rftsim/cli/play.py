@@ -13,8 +13,9 @@ from rich.table import Table
 
 from rftsim.cli.extra import needing
 from rftsim.cli.inspect import Settings, settings
-from rftsim.cli.output import check_writable, print_json, replacing
+from rftsim.cli.output import print_json
 from rftsim.errors import RftsimError
+from rftsim.files import check_writable, replacing
 
 SHOWN = {"r": "return", "l": "steps", "speed": "speed [m/s]", "command": "commanded [m/s]", "slip": "slip"}
 SHOWN |= {"power": "power [W]", "cost_of_transport": "cost of transport"}

@@ -13,7 +13,8 @@ from rich.console import Console
 from rich.progress import Progress
 
 from rftsim.cli.inspect import Settings, settings
-from rftsim.cli.output import check_writable, print_json, replacing
+from rftsim.cli.output import print_json
+from rftsim.files import check_writable, replacing
 from rftsim.plots import plot_history, save_picture
 from rftsim.run import SAMPLES, run
 from rftsim.run import Run as Finished

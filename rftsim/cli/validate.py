@@ -13,8 +13,9 @@ from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
-from rftsim.cli.output import check_writable, print_json, replacing
+from rftsim.cli.output import print_json
 from rftsim.errors import RftsimError
+from rftsim.files import check_writable, replacing
 from rftsim.plots import plot_study
 from rftsim.validation.measured import DATA
 from rftsim.validation.studies import STUDIES, Found, choose, run

@@ -14,13 +14,13 @@ import fcntl
 import importlib.metadata
 import json
 import os
-import tempfile
 import warnings
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final
 
 from rftsim.errors import RftsimWarning
+from rftsim.files import replacing
 from rftsim.sand import make_sand
 from rftsim_envs import tasks
 from rftsim_envs.recipe import Training, TrainingError
@@ -209,20 +209,11 @@ def write_whole(path: Path, content: bytes) -> None:
     """Write a file so that at any moment either the old or the new one is there, whole.
 
     Raises:
-        TrainingError: It cannot be written; what was there is left.
+        RftsimError: It cannot be written; what was there is left.
     """
     try:
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}-", suffix=".part")
-        temporary = Path(name)
-        try:
-            with os.fdopen(handle, "wb") as file:
-                file.write(content)
-                file.flush()
-                os.fsync(file.fileno())
-            temporary.chmod(0o644)
-            temporary.replace(path)
-        finally:
-            temporary.unlink(missing_ok=True)
+        with replacing(path) as temporary:
+            temporary.write_bytes(content)
     except OSError as error:
         raise TrainingError(f"cannot write {path}: {error.strerror}") from error
 
