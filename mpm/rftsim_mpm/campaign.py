@@ -32,7 +32,7 @@ KINDS: dict[str, type[Job]] = {"plates": Plate, "pushes": Push, "wheels": Wheel}
 """By what they are called in files."""
 
 DATA = Path(__file__).parent / "data"
-"""Campaigns that are shipped: `plates`, `flat`, `solids`, `rates` and `wheels`."""
+"""Campaigns that are shipped: `plates`, `flat`, `solids`, `deep`, `rates` and `wheels`."""
 
 
 class Status(NamedTuple):
