@@ -31,10 +31,10 @@ REASON: Final = "Table C.1 has contact a cell early, see the rows below"
 
 def jobs(request: Request) -> dict[str, Callable[[], Any]]:
     """One for each campaign that is there."""
-    maps = {}
+    known = shipped("flat", flat) | shipped("solids", solids)
     for name in MAPS:
-        maps |= shipped(name, lambda _, name=name: plates(name))
-    return shipped("flat", flat) | maps | shipped("solids", solids)
+        known |= shipped(name, functools.partial(plates, name))
+    return known
 
 
 def flat(results: Results) -> list[dict[str, float]]:
@@ -43,7 +43,7 @@ def flat(results: Results) -> list[dict[str, float]]:
     return [{name: one["plate"][name] for name in keys} | {"alpha_z": one["alpha_N_m3"][2]} for one in results]
 
 
-def plates(name: str) -> dict[str, Any]:
+def plates(name: str, _: Results) -> dict[str, Any]:
     """3D-RFT's cubic fitted to a map, and what it and the source's table miss."""
     fit = _fitted(name)
     return {
