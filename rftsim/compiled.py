@@ -1,15 +1,19 @@
-"""What compiled code is cached under."""
+"""What the machine code is made from."""
 
 import hashlib
 from pathlib import Path
 from typing import Final
 
-_FILES = [path.read_bytes() for path in sorted(Path(__file__).parent.rglob("*.py"))]
-SOURCE: Final = hashlib.sha256(
-    b"".join(text for text in _FILES if b"from numba import" in text or b"TABLE_3_1" in text)
-).hexdigest()
-"""Identifies the source of what is compiled: the files that use numba, and the tables.
+_HERE: Final = Path(__file__).parent
+_BESIDES: Final = ("engine/block.py", "engine/layout.py", "packed.py", "registry.py", "tables.py")
+"""Files whose constants are compiled in, beside those that import numba."""
 
-Numba's cache distinguishes functions by what they close over, and does not see the functions that they call; so what
-is compiled with `cache=True` closes over this.
-"""
+
+def _is_compiled(path: Path, text: bytes) -> bool:
+    return b"\nfrom numba import" in text or path.relative_to(_HERE).as_posix() in _BESIDES
+
+
+_TEXTS: Final = {path: path.read_bytes() for path in sorted(_HERE.rglob("*.py"))}
+FILES: Final = tuple(path for path, text in _TEXTS.items() if _is_compiled(path, text))
+SOURCE: Final = hashlib.sha256(b"".join(_TEXTS[path] for path in FILES)).digest()
+"""Identifies it."""

@@ -14,7 +14,6 @@ from collections.abc import Callable
 from typing import Final, NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from rftsim import native, packed
 from rftsim.facets import Labels, features, merged, settled, split
@@ -82,6 +81,8 @@ class Economy(NamedTuple):
 
 def free_reach(seed: int) -> Reach:
     """Any orientation and any motion."""
+    from scipy.spatial.transform import Rotation  # not at start-up, see `facets`
+
     rotations = Rotation.random(POSES, random_state=np.random.default_rng(seed)).as_matrix()
     return Reach(rotations, np.broadcast_to(np.eye(6), (POSES, 6, 6)))
 

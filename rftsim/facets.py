@@ -9,7 +9,6 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from rftsim.surface import Array, Surface
 
@@ -57,6 +56,8 @@ def split(labels: Labels, chosen: Labels, points: Array, weights: Array) -> Labe
 
 def settled(labels: Labels, points: Array, weights: Array) -> Labels:
     """Labels after each point went to the cluster of the nearest mean, ROUNDS times."""
+    from scipy.spatial import cKDTree  # not at start-up, which it would slow by half a second
+
     for _ in range(ROUNDS):
         weight = np.bincount(labels, weights)
         means = np.column_stack([np.bincount(labels, weights * column) for column in points.T]) / weight[:, None]

@@ -1,16 +1,11 @@
 """Surfaces of a MuJoCo model's bodies: their geoms as checked triangles."""
 
-from typing import Any
-
 import mujoco
 import numpy as np
-import trimesh
-from numpy.typing import NDArray
 
+from rftsim import solids
 from rftsim.errors import SceneError
-from rftsim.surface import EDGE_ON_SINGLE, Array, Surface, joined, make_surface
-
-Faces = NDArray[np.integer[Any]]
+from rftsim.surface import EDGE_ON_SINGLE, Array, Faces, Surface, joined, make_surface
 
 _GEOM = mujoco.mjtGeom
 _SECTIONS = 24
@@ -86,20 +81,22 @@ def _geom_surface(model: mujoco.MjModel, geom: int, allow_open: bool) -> Surface
 def _primitive(kind: mujoco.mjtGeom, size: Array, label: str) -> tuple[Array, Faces]:
     """Tessellation of a primitive; round ones are blown up to their exact volume."""
     if kind == _GEOM.mjGEOM_BOX:
-        mesh = trimesh.creation.box(extents=2 * size)
-        return mesh.vertices, mesh.faces
+        return _faces(solids.box(2 * size))
     if kind in (_GEOM.mjGEOM_SPHERE, _GEOM.mjGEOM_ELLIPSOID):
-        mesh = trimesh.creation.icosphere(subdivisions=2)
+        ball = solids.ball(2)
         radii = size if kind == _GEOM.mjGEOM_ELLIPSOID else np.full(3, size[0])
-        return mesh.vertices * radii * (4 * np.pi / 3 / mesh.volume) ** (1 / 3), mesh.faces
+        return _faces(ball * radii * (4 * np.pi / 3 / solids.volume(ball)) ** (1 / 3))
     if kind == _GEOM.mjGEOM_CYLINDER:
-        mesh = trimesh.creation.cylinder(radius=size[0], height=2 * size[1], sections=_SECTIONS)
+        round_ = solids.cylinder(size[0], 2 * size[1], _SECTIONS)
         volume = 2 * np.pi * size[0] ** 2 * size[1]
     elif kind == _GEOM.mjGEOM_CAPSULE:
-        mesh = trimesh.creation.capsule(height=2 * size[1], radius=size[0], count=[_SECTIONS, _SECTIONS // 2])
-        mesh.vertices -= mesh.bounds.mean(axis=0)
+        round_ = solids.capsule(size[0], 2 * size[1], _SECTIONS // 2, _SECTIONS)
         volume = np.pi * size[0] ** 2 * (2 * size[1] + 4 / 3 * size[0])
     else:
         raise SceneError(f"{label} is of type {kind.name[len('mjGEOM_') :].lower()}, which has no surface for the sand")
-    widen = np.sqrt(volume / mesh.volume)
-    return mesh.vertices * [widen, widen, 1.0], mesh.faces
+    widen = np.sqrt(volume / solids.volume(round_))
+    return _faces(round_ * [widen, widen, 1.0])
+
+
+def _faces(triangles: Array) -> tuple[Array, Faces]:
+    return triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3)

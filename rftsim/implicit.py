@@ -22,7 +22,7 @@ from numba import njit
 from rftsim import dense, equation, rows
 from rftsim.equation import AT, PART, POINT, ROW, VECTOR
 from rftsim.kernels import TINY
-from rftsim.memory import doubles
+from rftsim.memory import doubles, room
 from rftsim.native_ahead import V_C, ahead, jacobian, moving_frame
 
 TOLERANCE: Final = 3e-3
@@ -81,21 +81,20 @@ def generalised(p, at, later, out):
 def evaluate(p, v, at):
     """Evaluate the wrenches at a velocity into a point."""
     h = doubles(equation.number(p, AT.step), 2)[0]
-    twist = np.empty(6)
+    twist = doubles(room(6), 6)
     sand = equation.number(p, AT.sand)
     for b in range(equation.number(p, AT.nbody)):
         twist_of(p, b, v, twist)
         f, r = equation.body_frame(p, b).ctypes.data, equation.body_rotation(p, b).ctypes.data
         out = equation.point_wrench(p, at, b, 0).ctypes.data
         ahead(sand, equation.body_surface(p, b), f, r, twist.ctypes.data, h, out)
-        twist[0] = 0.0  # used after the call, so that it lives as long as its address is
     doubles(equation.number(p, AT.counts), 3)[0] += 1.0
 
 
 @njit
 def differentiate(p, v, entry):
     """Evaluate the derivative of each body's wrench by its twist, the exact or the completed one, into its entry."""
-    twist = np.empty(6)
+    twist = doubles(room(6), 6)
     sand = equation.number(p, AT.sand)
     completed = 1.0 if entry == AT.completed else 0.0
     for b in range(equation.number(p, AT.nbody)):
@@ -103,7 +102,6 @@ def differentiate(p, v, entry):
         f, r = equation.body_frame(p, b).ctypes.data, equation.body_rotation(p, b).ctypes.data
         out = equation.derivative(p, entry, b).ctypes.data
         jacobian(sand, equation.body_surface(p, b), f, r, twist.ctypes.data, completed, out)
-        twist[0] = 0.0
     doubles(equation.number(p, AT.counts), 3)[1] += 1.0
 
 
@@ -301,7 +299,7 @@ def _crossing(p, j, direction, x, moved, tried, force, slope, stiff, h):
 @njit
 def _update(p, old, new):
     """Broyden's rank-one update of each body's derivative from two points."""
-    moved, twist = np.empty(6), np.empty(6)
+    moved, twist = doubles(room(6), 6), doubles(room(6), 6)
     v = equation.point_vector(p, equation.point(p, old), PART.velocity)
     u = equation.point_vector(p, equation.point(p, new), PART.velocity)
     for b in range(equation.number(p, AT.nbody)):
@@ -333,7 +331,8 @@ def _rest_along(p, direction, share):
     """
     at = equation.point(p, POINT.now)
     v = equation.point_vector(p, at, PART.velocity)
-    a, c, there, q = np.empty(6), np.empty(6), equation.vector(p, VECTOR.sand), equation.vector(p, VECTOR.missing)
+    a, c = doubles(room(6), 6), doubles(room(6), 6)
+    there, q = equation.vector(p, VECTOR.sand), equation.vector(p, VECTOR.missing)
     found = 0.0
     for b in range(equation.number(p, AT.nbody)):
         twist_of(p, b, v, a)
@@ -403,7 +402,7 @@ def centre(p):
     if is_small:
         return
     h = doubles(equation.number(p, AT.step), 2)[0]
-    twist, wrench = np.empty(6), np.empty(6)
+    twist, wrench = doubles(room(6), 6), doubles(room(6), 6)
     for k in range(v.size):
         difference[k] = 0.0
     for b in range(equation.number(p, AT.nbody)):

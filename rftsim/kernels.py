@@ -14,13 +14,12 @@ import numpy as np
 from numba import njit
 
 from rftsim import tables
+from rftsim.packed import BLOCK
 
 FASTMATH = {"reassoc", "contract", "arcp", "nsz"}
 """Floating-point liberties of the compiled loops."""
 
 TINY = 1e-300
-BLOCK = 64
-"""Triangles that are evaluated together."""
 STEP = 1e300
 
 _T31 = tuple(tables.TABLE_3_1[key] for key in ("A00", "A10", "B11", "B01", "Bm11", "C11", "C01", "Cm11", "D10"))

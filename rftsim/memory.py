@@ -1,8 +1,10 @@
-"""Raw memory for compiled code: typed views of addresses, and allocation without the interpreter lock."""
+"""Raw memory for compiled code: typed views of addresses, and memory without the interpreter and its lock."""
 
 from typing import Any
 
+from llvmlite import ir
 from numba import carray, njit, types
+from numba.core.cgutils import alloca_once
 from numba.extending import intrinsic
 
 
@@ -56,6 +58,33 @@ def pointer(address):
     return int64s(address, 1)[0]
 
 
+def named_address(name: str) -> Any:
+    """A compiled function that gives the address of what is published under a name."""
+
+    @intrinsic
+    def find(typing_context: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            module = builder.module
+            place = module.globals.get(name) or ir.GlobalVariable(module, ir.IntType(64), name)
+            return builder.ptrtoint(place, context.get_value_type(types.intp))
+
+        return types.intp(), generate
+
+    return find
+
+
+@intrinsic(prefer_literal=True)
+def room(typing_context: Any, size: Any) -> Any:
+    """The address of so many float64, a constant, that live as long as the calling function runs."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        place = alloca_once(builder, ir.ArrayType(ir.DoubleType(), size.literal_value))
+        return builder.ptrtoint(place, context.get_value_type(types.intp))
+
+    return (types.intp(size), generate) if isinstance(size, types.IntegerLiteral) else None
+
+
 # The interpreter exports these symbols, and they need no interpreter lock.
+take = types.ExternalFunction("PyMem_RawMalloc", types.intp(types.uintp))
 allocate = types.ExternalFunction("PyMem_RawCalloc", types.intp(types.uintp, types.uintp))
 release = types.ExternalFunction("PyMem_RawFree", types.void(types.intp))

@@ -1,17 +1,15 @@
-"""The laws' loops for the implicit force, as functions of plain addresses; see `native`.
+"""The laws' loops for the implicit force, as functions of plain addresses; see `native_law`."""
 
-Apart from the others because they are many to compile, and only the implicit force asks for them.
-"""
-
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
-from numba import cfunc, njit, types
+from numba import njit, types
 
-from rftsim import kernels, packed
-from rftsim.compiled import SOURCE
-from rftsim.memory import doubles
-from rftsim.native import publish, surface_at
+from rftsim import kernels, packed, unpack
+from rftsim.entries import address, entry
+from rftsim.kernels import SCRATCH
+from rftsim.memory import doubles, matrix, room
+from rftsim.native_law import surface_at
 
 FRAME: Final = 15
 """Numbers that fix a body's frame for a step: up, rise, forward, height, rear (4), drop."""
@@ -20,27 +18,19 @@ RAMP: Final = 100.0
 V_C: Final = 3e-7
 """Speed below which a triangle's stress falls to zero in the implicit force [m/s]; bodies at rest creep slower."""
 
-_address = types.intp
-_signatures: Final = {
-    "rftsim_frame": types.void(*[_address] * 7),
-    "rftsim_ahead": types.void(*[_address] * 5, types.float64, _address),
-    "rftsim_jacobian": types.void(*[_address] * 5, types.float64, _address),
-}
-frame, ahead, jacobian = (types.ExternalFunction(name, signature) for name, signature in _signatures.items())
-
 
 @njit(forceinline=True)
 def moving_frame(f, xmat, twist):
     """The frame of a body that moves with a twist, velocity first, world axes."""
-    v0 = packed.to_body(xmat, twist[0], twist[1], twist[2])
-    omega = packed.to_body(xmat, twist[3], twist[4], twist[5])
+    v0 = unpack.to_body(xmat, twist[0], twist[1], twist[2])
+    omega = unpack.to_body(xmat, twist[3], twist[4], twist[5])
     up, rise, forward = (f[0], f[1], f[2]), (f[3], f[4], f[5]), (f[6], f[7], f[8])
     return kernels.Frame(v0, omega, up, rise, forward, f[9], (f[10], f[11], f[12], f[13]), f[14])
 
 
 @njit(forceinline=True)
 def _soft_medium(sand, surface):
-    medium = packed.medium_of(sand, surface)
+    medium = unpack.medium_of(sand, surface)
     return kernels.Medium(medium.xi, medium.mu_surf, medium.lambda_rho, medium.edge_on, RAMP, medium.table)
 
 
@@ -55,77 +45,75 @@ def _reach(surface, frame, h):
     return h * (np.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) + turn)
 
 
-def _make(source: str) -> dict[str, Any]:
-    """The functions by name; each closes over `source`, see `compiled.SOURCE`."""
-
-    @cfunc(_signatures["rftsim_frame"], cache=True)
-    def rftsim_frame(sand, surface, xpos, xmat, velocity, omega, out):
-        """What of a body's frame does not change within a step, (FRAME,)."""
-        x, r, v, w = doubles(xpos, 3), doubles(xmat, 9), doubles(velocity, 3), doubles(omega, 3)
-        f = packed.frame_of(doubles(sand, packed.SAND_SIZE), surface_at(surface), x, r, v, w)
-        kept = doubles(out, FRAME if source else 0)
-        for k in range(3):
-            kept[k], kept[3 + k], kept[6 + k] = f.up[k], f.rise[k], f.forward[k]
-        for k in range(4):
-            kept[10 + k] = f.rear[k]
-        kept[9], kept[14] = f.height, f.drop
-
-    @cfunc(_signatures["rftsim_ahead"], cache=True)
-    def rftsim_ahead(sand, surface, frame, xmat, twist, h, out):
-        """Wrench continuous at rest, world frame: at the present depths, and at those after a time h, (12,)."""
-        s, body, r = doubles(sand, packed.SAND_SIZE), surface_at(surface), doubles(xmat, 9)
-        f, medium = moving_frame(doubles(frame, FRAME), r, doubles(twist, 6)), _soft_medium(s, body)
-        cx, cy, cz, nx, ny, nz, area = packed.columns(body)
-        total, reach = doubles(out, 12), _reach(body, f, h)
-        for k in range(12):
-            total[k] = 0.0
-        last = 0 if source else area.size
-        while last < area.size:
-            first, last = packed.next_run(body, last, area.size, f, reach)
-            if s[0] == 0.0:
-                g = kernels.ahead_2d(cx, cy, cz, nx, ny, nz, area, first, last, f, medium, V_C, h)
-            elif s[0] == 1.0:
-                g = kernels.ahead_3d(cx, cy, cz, nx, ny, nz, area, first, last, f, medium, V_C, h)
-            else:
-                g = kernels.ahead_3d_quartic(cx, cy, cz, nx, ny, nz, area, first, last, f, medium, V_C, h)
-            for part in range(0, 12, 3):
-                a, b, c = packed.to_world(r, g[part], g[part + 1], g[part + 2])
-                total[part] += a
-                total[part + 1] += b
-                total[part + 2] += c
-
-    @cfunc(_signatures["rftsim_jacobian"], cache=True)
-    def rftsim_jacobian(sand, surface, frame, xmat, twist, completed, out):
-        """Derivative of `rftsim_ahead`'s present wrench by the twist, world frame, (6, 6)."""
-        s, body, r = doubles(sand, packed.SAND_SIZE), surface_at(surface), doubles(xmat, 9)
-        f, medium = moving_frame(doubles(frame, FRAME), r, doubles(twist, 6)), _soft_medium(s, body)
-        count = int(body[14]) if source else 0
-        scratch, local, turned = np.empty(kernels.SCRATCH), np.zeros((6, 6)), np.empty((6, 6))
-        for first in range(0, count, kernels.BLOCK):
-            if packed.block_is_clear(body, first // kernels.BLOCK, f, 0.0):
-                continue
-            for column in range(packed.COLUMNS):
-                start = packed.HEADER + column * count + first
-                for i in range(kernels.BLOCK):  # past the last triangle, ones without area
-                    value = body[start + i] if first + i < count else 0.0
-                    scratch[kernels.COLUMNS_AT + column * kernels.BLOCK + i] = value
-            if s[0] == 0.0:
-                kernels.jacobian_2d(f, medium, V_C, completed, scratch, local)
-            elif s[0] == 1.0:
-                kernels.jacobian_3d(f, medium, V_C, completed, scratch, local)
-            else:
-                kernels.jacobian_3d_quartic(f, medium, V_C, completed, scratch, local)
-        g = doubles(out, 36).reshape(6, 6)
-        for half in range(0, 6, 3):  # R G R'
-            for k in range(6):
-                x, y, z = packed.to_world(r, local[half, k], local[half + 1, k], local[half + 2, k])
-                turned[half, k], turned[half + 1, k], turned[half + 2, k] = x, y, z
-        for half in range(0, 6, 3):
-            for k in range(6):
-                x, y, z = packed.to_world(r, turned[k, half], turned[k, half + 1], turned[k, half + 2])
-                g[k, half], g[k, half + 1], g[k, half + 2] = x, y, z
-
-    return {function.__name__: function for function in (rftsim_frame, rftsim_ahead, rftsim_jacobian)}
+@entry(types.void, *[address] * 7)
+def frame(sand, surface, xpos, xmat, velocity, omega, out):
+    """What of a body's frame does not change within a step, (FRAME,)."""
+    x, r, v, w = doubles(xpos, 3), doubles(xmat, 9), doubles(velocity, 3), doubles(omega, 3)
+    f = unpack.frame_of(doubles(sand, packed.SAND_SIZE), surface_at(surface), x, r, v, w)
+    kept = doubles(out, FRAME)
+    for k in range(3):
+        kept[k], kept[3 + k], kept[6 + k] = f.up[k], f.rise[k], f.forward[k]
+    for k in range(4):
+        kept[10 + k] = f.rear[k]
+    kept[9], kept[14] = f.height, f.drop
 
 
-publish(_make(SOURCE))
+@entry(types.void, *[address] * 5, types.float64, address)
+def ahead(sand, surface, frame, xmat, twist, h, out):
+    """Wrench continuous at rest, world frame: at the present depths, and at those after a time h, (12,)."""
+    s, body, r = doubles(sand, packed.SAND_SIZE), surface_at(surface), doubles(xmat, 9)
+    f, medium = moving_frame(doubles(frame, FRAME), r, doubles(twist, 6)), _soft_medium(s, body)
+    cx, cy, cz, nx, ny, nz, area = unpack.columns(body)
+    total, reach = doubles(out, 12), _reach(body, f, h)
+    for k in range(12):
+        total[k] = 0.0
+    last = 0
+    while last < area.size:
+        first, last = unpack.next_run(body, last, area.size, f, reach)
+        if s[0] == 0.0:
+            g = kernels.ahead_2d(cx, cy, cz, nx, ny, nz, area, first, last, f, medium, V_C, h)
+        elif s[0] == 1.0:
+            g = kernels.ahead_3d(cx, cy, cz, nx, ny, nz, area, first, last, f, medium, V_C, h)
+        else:
+            g = kernels.ahead_3d_quartic(cx, cy, cz, nx, ny, nz, area, first, last, f, medium, V_C, h)
+        for part in range(0, 12, 3):
+            a, b, c = unpack.to_world(r, g[part], g[part + 1], g[part + 2])
+            total[part] += a
+            total[part + 1] += b
+            total[part + 2] += c
+
+
+@entry(types.void, *[address] * 5, types.float64, address)
+def jacobian(sand, surface, frame, xmat, twist, completed, out):
+    """Derivative of `ahead`'s present wrench by the twist, world frame, (6, 6)."""
+    s, body, r = doubles(sand, packed.SAND_SIZE), surface_at(surface), doubles(xmat, 9)
+    f, medium = moving_frame(doubles(frame, FRAME), r, doubles(twist, 6)), _soft_medium(s, body)
+    count = int(body[14])
+    scratch = doubles(room(SCRATCH), SCRATCH)
+    local, turned = matrix(room(36), 6, 6), matrix(room(36), 6, 6)
+    for i in range(6):
+        for k in range(6):
+            local[i, k] = 0.0
+    for first in range(0, count, kernels.BLOCK):
+        if unpack.block_is_clear(body, first // kernels.BLOCK, f, 0.0):
+            continue
+        for column in range(packed.COLUMNS):
+            start = packed.HEADER + column * count + first
+            for i in range(kernels.BLOCK):  # past the last triangle, ones without area
+                value = body[start + i] if first + i < count else 0.0
+                scratch[kernels.COLUMNS_AT + column * kernels.BLOCK + i] = value
+        if s[0] == 0.0:
+            kernels.jacobian_2d(f, medium, V_C, completed, scratch, local)
+        elif s[0] == 1.0:
+            kernels.jacobian_3d(f, medium, V_C, completed, scratch, local)
+        else:
+            kernels.jacobian_3d_quartic(f, medium, V_C, completed, scratch, local)
+    g = matrix(out, 6, 6)
+    for half in range(0, 6, 3):  # R G R'
+        for k in range(6):
+            x, y, z = unpack.to_world(r, local[half, k], local[half + 1, k], local[half + 2, k])
+            turned[half, k], turned[half + 1, k], turned[half + 2, k] = x, y, z
+    for half in range(0, 6, 3):
+        for k in range(6):
+            x, y, z = unpack.to_world(r, turned[k, half], turned[k, half + 1], turned[k, half + 2])
+            g[k, half], g[k, half + 1], g[k, half + 2] = x, y, z

@@ -1,33 +1,18 @@
-"""One time step of the implicit force as a function of plain addresses; see `native`."""
+"""One time step of the implicit force as functions of a plain address; see `entries`."""
 
-from typing import Any, Final
-
-from numba import cfunc, types
+from numba import types
 
 from rftsim import stepping
-from rftsim.compiled import SOURCE
-from rftsim.native import publish
-
-_signatures: Final = {
-    "rftsim_is_needed": types.intc(types.intp),
-    "rftsim_step": types.void(types.intp),
-}
-is_needed, step = (types.ExternalFunction(name, signature) for name, signature in _signatures.items())
+from rftsim.entries import address, entry
 
 
-def _make(source: str) -> dict[str, Any]:
-    """The functions by name; each closes over `source`, see `compiled.SOURCE`."""
-
-    @cfunc(_signatures["rftsim_is_needed"], cache=True)
-    def rftsim_is_needed(p):
-        return 1 if source and stepping.is_needed(p) else 0
-
-    @cfunc(_signatures["rftsim_step"], cache=True)
-    def rftsim_step(p):
-        if source:
-            stepping.step(p)
-
-    return {"rftsim_is_needed": rftsim_is_needed, "rftsim_step": rftsim_step}
+@entry(types.intc, address)
+def is_needed(p):
+    """Whether the sand can act in the step."""
+    return 1 if stepping.is_needed(p) else 0
 
 
-publish(_make(SOURCE))
+@entry(types.void, address)
+def step(p):
+    """The sand's generalised force of one step."""
+    stepping.step(p)

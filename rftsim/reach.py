@@ -5,7 +5,6 @@ from typing import Final
 
 import mujoco
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from rftsim.economy import POSES, Reach, middle
 from rftsim.sand import FreeSurface
@@ -48,6 +47,8 @@ def _scatter(model: mujoco.MjModel, qpos: Array, rng: np.random.Generator) -> No
         limited, (low, high) = bool(model.jnt_limited[joint]), model.jnt_range[joint]
         if kind in (_JOINT.mjJNT_FREE, _JOINT.mjJNT_BALL):
             at += 3 if kind == _JOINT.mjJNT_FREE else 0
+            from scipy.spatial.transform import Rotation  # not at start-up, see `facets`
+
             turned = Rotation.random(random_state=rng)
             if limited:
                 axis = turned.apply([0.0, 0.0, 1.0])

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from rftsim import native, packed
-from rftsim.engine.instance import BODY_MARKER, SAND_MARKER, read_counters, read_wrenches
+from rftsim.engine.block import BODY_MARKER, SAND_MARKER, read_counters, read_wrenches
 from rftsim.errors import SceneError
 from rftsim.surface import Array
 

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from rftsim import economy, packed
 from rftsim.economy import Economy
-from rftsim.engine import instance as engine
+from rftsim.engine import block as engine
 from rftsim.engine import plugin
 from rftsim.errors import RftsimWarning, SceneError
 from rftsim.geometry import body_surface, is_colliding

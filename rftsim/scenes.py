@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 import mujoco
-import trimesh
 from rftsim_models import intruder, wheels
 
 from rftsim.errors import SceneError
@@ -83,6 +82,8 @@ def _wheel_scene(
 
 def _intruder(settings: Settings) -> mujoco.MjSpec:
     if settings["mesh"] == "sphere":
+        import trimesh  # not at start-up, which it would slow by a second
+
         mesh = trimesh.creation.icosphere(subdivisions=3, radius=0.05)
         vertices, faces = mesh.vertices, mesh.faces
     else:

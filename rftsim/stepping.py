@@ -13,9 +13,9 @@ from typing import Final
 import numpy as np
 from numba import njit
 
-from rftsim import dense, equation, implicit, kernels, native_ahead, native_solver, packed, rows
+from rftsim import dense, equation, implicit, kernels, native_ahead, native_solver, packed, rows, unpack
 from rftsim.equation import AT, KEEP, KIND, PART, POINT, ROW
-from rftsim.memory import doubles, int64s
+from rftsim.memory import doubles, int64s, room
 from rftsim.native_ahead import FRAME
 from rftsim.state import DRIFT, HEAD, KNOWS_DERIVATIVE, KNOWS_FORCE, SPLIT, STARTED, part_of, state_size
 
@@ -44,7 +44,9 @@ def _timestep(p):
 @njit
 def is_near(p):
     """Whether any triangle can be in the sand within the step."""
-    v, h, twist = equation.of_dofs(p, AT.velocity), _timestep(p), np.zeros(6)
+    v, h, twist = equation.of_dofs(p, AT.velocity), _timestep(p), doubles(room(6), 6)
+    for k in range(6):
+        twist[k] = 0.0
     for b in range(equation.number(p, AT.nbody)):
         surface = doubles(equation.body_surface(p, b), packed.HEADER)
         frame = implicit.frame_at(p, b, twist)
@@ -93,7 +95,7 @@ def _lowered(frame, h):
 @njit
 def _sink(p, v, h):
     """Move the depths by a time h of the motion v; positions and normals stay."""
-    twist = np.empty(6)
+    twist = doubles(room(6), 6)
     for b in range(equation.number(p, AT.nbody)):
         implicit.twist_of(p, b, v, twist)
         frame, f = implicit.frame_at(p, b, twist), equation.body_frame(p, b)
@@ -104,16 +106,16 @@ def _sink(p, v, h):
 @njit
 def _deepest(p, b, v, h):
     """Largest depth of a body's triangles, now or after a time h [m]."""
-    twist = np.empty(6)
+    twist = doubles(room(6), 6)
     implicit.twist_of(p, b, v, twist)
     address = equation.body_surface(p, b)
-    surface = doubles(address, packed.size_of(doubles(address, packed.HEADER)))
-    cx, cy, cz, _, _, _, area = packed.columns(surface)
+    surface = doubles(address, unpack.size_of(doubles(address, packed.HEADER)))
+    cx, cy, cz, _, _, _, area = unpack.columns(surface)
     frame, found = implicit.frame_at(p, b, twist), -1e30
     for _ in range(2):
         last = 0
         while last < area.size:
-            first, last = packed.next_run(surface, last, area.size, frame, 0.0)
+            first, last = unpack.next_run(surface, last, area.size, frame, 0.0)
             found = max(found, kernels.deepest(cx, cy, cz, first, last, frame))
         turned, lowered = _turned(frame, h), _lowered(frame, h)
         frame = kernels.Frame(frame.v0, frame.omega, frame.up, turned, frame.forward, lowered, frame.rear, frame.drop)

@@ -2,15 +2,16 @@
 
 import dataclasses
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
-import trimesh
 from numpy.typing import ArrayLike, NDArray
 
 from rftsim.errors import SurfaceError
+from rftsim.splitting import split
 
 Array = NDArray[np.float64]
+Faces = NDArray[np.integer[Any]]
 
 EDGE_ON_DOUBLE: Final = 1e-9
 EDGE_ON_SINGLE: Final = 1e-6
@@ -116,12 +117,7 @@ class Surface:
         """The surface with its triangles split until no edge exceeds max_edge [m]."""
         if not max_edge > 0.0:
             raise ValueError(f"max_edge must be positive, not {max_edge:g}")
-        vertices = self.triangles.reshape(-1, 3)
-        faces = np.arange(len(vertices)).reshape(-1, 3)
-        needed = np.linalg.norm(np.diff(self.triangles, axis=1, append=self.triangles[:, :1]), axis=2).max()
-        levels = max(int(np.ceil(np.log2(max(needed / max_edge, 1.0)))) + 1, 1)
-        vertices, faces = trimesh.remesh.subdivide_to_size(vertices, faces, max_edge, max_iter=levels)
-        return dataclasses.replace(self, triangles=vertices[faces])
+        return dataclasses.replace(self, triangles=split(self.triangles, max_edge))
 
 
 def joined(surfaces: "list[Surface]") -> Surface:
@@ -159,30 +155,30 @@ def make_surface(
     if bad.any():
         raise SurfaceError(f"{name}: face {int(np.argmax(bad))} has a vertex that is not finite")
     notes: list[str] = []
-    mesh = trimesh.Trimesh(points, corners, process=False)
-    mesh.merge_vertices(merge_tex=True, merge_norm=True)
-    _drop(mesh, mesh.area_faces > 1e-14 * mesh.scale**2, f"{name}: dropped %d faces of no area", notes)
-    unique = np.zeros(len(mesh.faces), dtype=bool)
-    unique[np.unique(np.sort(mesh.faces, axis=1), axis=0, return_index=True)[1]] = True
-    _drop(mesh, unique, f"{name}: dropped %d repeated faces", notes)
-    if not len(mesh.faces):
+    points, corners = _merged(points, corners)
+    extent = float(np.linalg.norm(np.ptp(points, axis=0)))
+    areas = np.linalg.norm(np.cross(*_edges(points[corners])), axis=1) / 2.0
+    corners = _kept(corners, areas > 1e-14 * extent**2, f"{name}: dropped %d faces of no area", notes)
+    unique = np.zeros(len(corners), dtype=bool)
+    unique[_distinct(np.sort(corners, axis=1))[0]] = True
+    corners = _kept(corners, unique, f"{name}: dropped %d repeated faces", notes)
+    if not len(corners):
         raise SurfaceError(f"{name} has no face with an area; the sand needs a closed triangle mesh")
-    _wind(mesh, name, notes)
-    open_face = _open_face(mesh.faces)
+    corners = _wound(points, corners, name, notes)
+    open_face = _open_face(corners)
     if open_face is not None:
-        text = (
-            f"{name} is open at face {open_face} of {len(mesh.faces)}, near {_point(mesh.triangles_center[open_face])}"
-        )
+        near = _point(points[corners[open_face]].mean(axis=0))
+        text = f"{name} is open at face {open_face} of {len(corners)}, near {near}"
         if not allow_open:
             raise SurfaceError(f"{text}: close it, or allow open meshes (then only its outer side is felt)")
         notes.append(text)
-    size = float(np.ptp(mesh.vertices, axis=0).max())
+    size = float(np.ptp(points, axis=0).max())
     if not SMALLEST <= size <= LARGEST:
         notes.append(
             f"{name} is {size:g} m in size; lengths are in metres"
             + (f": a mesh in millimetres needs scale 0.001 ({size / 1000:g} m)" if size > LARGEST else "")
         )
-    return Surface(np.array(mesh.triangles, dtype=float), edge_on=edge_on, notes=tuple(notes))
+    return Surface(points[corners], edge_on=edge_on, notes=tuple(notes))
 
 
 def load_surface(path: "str | Path", *, scale: float = 1.0, allow_open: bool = False) -> Surface:
@@ -196,6 +192,8 @@ def load_surface(path: "str | Path", *, scale: float = 1.0, allow_open: bool = F
         raise SurfaceError(f"no mesh file {path}")
     if not (np.isfinite(scale) and scale > 0.0):
         raise SurfaceError(f"the mesh scale must be positive, not {scale:g}")
+    import trimesh  # not at start-up, which it would slow by a second
+
     try:
         mesh = trimesh.load_mesh(path, process=False)
     except Exception as error:  # trimesh's readers raise whatever their parsers raise
@@ -209,33 +207,73 @@ def _point(x: ArrayLike) -> str:
     return "(" + ", ".join(f"{value:.4g}" for value in np.asarray(x)) + ")"
 
 
-def _drop(mesh: trimesh.Trimesh, keep: NDArray[np.bool_], note: str, notes: list[str]) -> None:
+def _merged(points: Array, faces: Faces) -> tuple[Array, Faces]:
+    """Vertices that faces have, none twice, to 1e-8, and the faces on them."""
+    used, faces = np.unique(faces, return_inverse=True)
+    points = points[used]
+    first, same = _distinct(np.round(points * 1e8).astype(np.int64))
+    return points[first], same[faces].reshape(-1, 3)
+
+
+def _distinct(rows: Faces) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Where each distinct row of integers is first, and which of these each row is."""
+    first, same = np.zeros(1, dtype=int), np.zeros(len(rows), dtype=int)
+    for column in rows.T:
+        value = np.unique(column, return_inverse=True)[1]
+        _, first, same = np.unique(same * (value.max() + 1) + value, return_index=True, return_inverse=True)
+    return first, same
+
+
+def _kept(faces: Faces, keep: NDArray[np.bool_], note: str, notes: list[str]) -> Faces:
     if not keep.all():
-        mesh.update_faces(keep)
         notes.append(note % np.count_nonzero(~keep))
+    return faces[keep]
 
 
-def _wind(mesh: trimesh.Trimesh, name: str, notes: list[str]) -> None:
+def _wound(points: Array, before: Faces, name: str, notes: list[str]) -> Faces:
     """Make the winding consistent and outward, and drop shells that lie inside another: no sand reaches them."""
-    before = mesh.faces.copy()
-    if _open_face(mesh.faces) is not None:
+    faces = before.copy()
+    if _open_face(faces) is not None:
+        import trimesh  # not at start-up, which it would slow by a second
+
+        mesh = trimesh.Trimesh(points, faces, process=False)
         trimesh.repair.fix_winding(mesh)
-    labels = trimesh.graph.connected_component_labels(mesh.face_adjacency, node_count=len(mesh.faces))
-    faces = mesh.faces.copy()
-    shells = [np.flatnonzero(labels == label) for label in range(labels.max() + 1)]
+        faces = np.array(mesh.faces)
+    labels = _shells(faces)
+    triangles = points[faces]
+    shells = [np.flatnonzero(labels == label) for label in np.unique(labels)]
     enclosed = np.zeros(len(faces), dtype=bool)
     for shell in shells:
         others = [other for other in shells if other is not shell]
-        point = mesh.triangles[shell[0], 0]
-        enclosed[shell] = any(abs(_winding_number(mesh.triangles[other], point)) > 0.5 for other in others)
-        volume = np.einsum("ij,ij->", mesh.triangles_center[shell], np.cross(*_edges(mesh.triangles[shell]))) / 6.0
+        point = triangles[shell[0], 0]
+        enclosed[shell] = any(abs(_winding_number(triangles[other], point)) > 0.5 for other in others)
+        volume = np.einsum("ij,ij->", triangles[shell].mean(axis=1), np.cross(*_edges(triangles[shell]))) / 6.0
         if volume < 0.0 and not enclosed[shell[0]]:
             faces[shell] = faces[shell][:, ::-1]
-    mesh.faces = faces
     flipped = int((_cyclic(before) != _cyclic(faces)).any(axis=1)[~enclosed].sum())
     if flipped:
         notes.append(f"{name}: turned {flipped} of {len(faces)} faces outward")
-    _drop(mesh, ~enclosed, f"{name}: dropped %d faces of shells inside another, which no sand reaches", notes)
+    return _kept(faces, ~enclosed, f"{name}: dropped %d faces of shells inside another, which no sand reaches", notes)
+
+
+def _shells(faces: Faces) -> NDArray[np.intp]:
+    """A number for each face, the same where edges that two faces share lead from one to the other."""
+    edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    edge = _distinct(edges)[1]
+    order = np.argsort(edge, kind="stable")
+    order = order[np.bincount(edge)[edge[order]] == 2]
+    one, other = order[::2] // 3, order[1::2] // 3
+    labels = np.arange(len(faces))
+    while True:
+        least = np.minimum(labels[one], labels[other])
+        lower = labels.copy()
+        for face in (one, other):
+            np.minimum.at(lower, face, least)
+            np.minimum.at(lower, labels[face], least)
+        lower = lower[lower]
+        if (lower == labels).all():
+            return labels
+        labels = lower
 
 
 def _winding_number(triangles: Array, point: Array) -> float:
@@ -252,13 +290,13 @@ def _edges(triangles: Array) -> tuple[Array, Array]:
     return triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
 
 
-def _cyclic(faces: NDArray[np.int64]) -> NDArray[np.int64]:
+def _cyclic(faces: Faces) -> Faces:
     """Faces rotated so that the smallest vertex comes first, which leaves the winding."""
     start = np.argmin(faces, axis=1)[:, None]
     return np.take_along_axis(faces, (start + np.arange(3)) % 3, axis=1)
 
 
-def _open_face(faces: NDArray[np.int64]) -> int | None:
+def _open_face(faces: Faces) -> int | None:
     """A face one of whose directed edges has no opposite, or None where the surface is closed."""
     tail, head = faces[:, [0, 1, 2]].ravel(), faces[:, [1, 2, 0]].ravel()
     n = int(faces.max()) + 1

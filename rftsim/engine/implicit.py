@@ -6,29 +6,28 @@ bias and the constraints' reference are the last step's. They are computed here 
 
 from typing import Final
 
-import mujoco
-import numpy as np
 from numba import njit
 
 from rftsim import dense, equation, native_ahead, native_step
-from rftsim.engine import bodies, external, instance
-from rftsim.equation import AT, KIND, VECTOR
-from rftsim.memory import doubles, int32s, int64s, pointer
+from rftsim.engine import block, bodies, external, instance
+from rftsim.engine.layout import CONSTANTS
+from rftsim.equation import AT, ENTRIES, KIND, VECTOR
+from rftsim.memory import doubles, int32s, int64s, pointer, release, room, take
 
-_EULER: Final = int(mujoco.mjtIntegrator.mjINT_EULER)
-_IMPLICIT: Final = int(mujoco.mjtIntegrator.mjINT_IMPLICIT)
-_UNDAMPED: Final = int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP) | int(mujoco.mjtDisableBit.mjDSBL_DAMPER)
+_UNDAMPED: Final = CONSTANTS["no_euler_damping"] | CONSTANTS["no_damping"]
+_EULER: Final = CONSTANTS["euler"]
+_IMPLICIT: Final = CONSTANTS["implicit"]
 _KIND: Final = {
-    mujoco.mjtConstraint.mjCNSTR_EQUALITY: KIND.equality,
-    mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF: KIND.friction,
-    mujoco.mjtConstraint.mjCNSTR_FRICTION_TENDON: KIND.friction,
-    mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT: KIND.limit,
-    mujoco.mjtConstraint.mjCNSTR_LIMIT_TENDON: KIND.limit,
-    mujoco.mjtConstraint.mjCNSTR_CONTACT_FRICTIONLESS: KIND.contact,
-    mujoco.mjtConstraint.mjCNSTR_CONTACT_PYRAMIDAL: KIND.contact,
-    mujoco.mjtConstraint.mjCNSTR_CONTACT_ELLIPTIC: KIND.cone,
+    "equality": KIND.equality,
+    "dof_friction": KIND.friction,
+    "tendon_friction": KIND.friction,
+    "joint_limit": KIND.limit,
+    "tendon_limit": KIND.limit,
+    "frictionless_contact": KIND.contact,
+    "pyramidal_contact": KIND.contact,
+    "elliptic_contact": KIND.cone,
 }
-_KINDS: Final = tuple(_KIND[key] for key in sorted(_KIND, key=int))
+_KINDS: Final = tuple(_KIND[name] for name in sorted(_KIND, key=CONSTANTS.__getitem__))
 
 
 @njit
@@ -169,18 +168,18 @@ def _fill_rows(model, data, contact, m, d, p, dragged):
 @njit
 def _fill_bodies(model, m, t, table, p):
     """The bodies of the instance."""
-    n, v, w = table[0], np.empty(3), np.empty(3)
+    n, v, w = table[0], doubles(room(3), 3), doubles(room(3), 3)
     numerics = int32s(pointer(m + model.numeric_adr), pointer(m + model.nnumeric))
     first = pointer(m + model.numeric_data)
     lengths, surfaces = (
         doubles(equation.number(p, AT.length), n),
         int64s(equation.number(p, AT.surface), n),
     )
-    sand = first + instance.SIZE * numerics[table[1]]
-    int64s(p, equation.ENTRIES)[AT.sand] = sand
+    sand = first + block.SIZE * numerics[table[1]]
+    int64s(p, ENTRIES)[AT.sand] = sand
     for k in range(n):
-        body, field = table[instance.HEAD + 2 * k], table[instance.HEAD + 2 * k + 1]
-        surfaces[k] = first + instance.SIZE * numerics[field]
+        body, field = table[block.HEAD + 2 * k], table[block.HEAD + 2 * k + 1]
+        surfaces[k] = first + block.SIZE * numerics[field]
         lengths[k] = doubles(surfaces[k], 16)[15]
         bodies.jacobian(t, body, equation.body_jacobian(p, k))
         r, f = equation.body_rotation(p, k), equation.body_frame(p, k)
@@ -188,7 +187,6 @@ def _fill_bodies(model, m, t, table, p):
         bodies.twist(t, body, v, w)
         x = t.xpos[3 * body : 3 * body + 3].ctypes.data
         native_ahead.frame(sand, surfaces[k], x, r.ctypes.data, v.ctypes.data, w.ctypes.data, f.ctypes.data)
-        v[0] = w[0] = 0.0  # used after the call
 
 
 @njit
@@ -204,10 +202,10 @@ def press(model, data, contact, m, d, number):
         wrenches[i] = 0.0
     counted[0] = counted[1] = counted[2] = 0.0
     rows = int32s(d + data.nefc, 1)[0]
-    entries = np.empty(equation.ENTRIES, np.int64)
-    p = entries.ctypes.data
-    memory = np.empty(equation.lay_out(p, 0 * nbody, nbody, nv, rows, old.size) // 8)
-    equation.lay_out(p, memory.ctypes.data, nbody, nv, rows, old.size)
+    p = room(ENTRIES)
+    entries = int64s(p, ENTRIES)
+    memory = take(equation.lay_out(p, 0 * nbody, nbody, nv, rows, old.size))
+    equation.lay_out(p, memory, nbody, nv, rows, old.size)
     entries[AT.old], entries[AT.new] = old.ctypes.data, new.ctypes.data
     entries[AT.counts] = counted.ctypes.data
     dense.copy(doubles(pointer(d + data.qvel), nv), equation.of_dofs(p, AT.velocity))
@@ -226,4 +224,4 @@ def press(model, data, contact, m, d, number):
         for i in range(nv):
             force[i] += q[i]
         dense.copy(doubles(entries[AT.wrench], wrenches.size), wrenches)
-    entries[0] = memory.size  # both live until here
+    release(memory)

@@ -1,32 +1,11 @@
-"""A plugin instance: which bodies feel its sand, where their numbers lie in the model, and what it remembers.
-
-The numbers are found by name. A numeric is a body's surface, or a bed's parameters, where its name without the marker
-is the body's, or the instance's, name; so MJCF attachment may put any prefix and suffix around both.
-
-What belongs to an mjData (`plugin_data` is its number in the registry) is one block: int64 [number of bodies, numeric
-of the bed, (body, numeric of its surface) ...], then float64 [last wrench of each body (6), counters (COUNTERS), state
-after the step under way]. What must last is MuJoCo's `plugin_state`, and is brought up to date only when a step ends.
-"""
-
-import ctypes
-from typing import Final
+"""A plugin instance for compiled code: its bodies and its block of memory, see `block`."""
 
 from numba import njit
 
-from rftsim import registry, state
+from rftsim import claims, state
+from rftsim.engine.block import BODY_MARKER, COUNTERS, HEAD, SAND_MARKER, SIZE, WRENCH
 from rftsim.memory import characters, doubles, int32s, int64s, pointer
 from rftsim.packed import SAND_SIZE
-
-CHUNK: Final = 500
-"""Numbers of one numeric: MuJoCo's XML reader takes no more. A surface goes on in the numerics behind its first."""
-BODY_MARKER: Final = "rftsim-body:"
-SAND_MARKER: Final = "rftsim-sand:"
-WRENCH: Final = 6
-"""Numbers of a wrench: force, then moment about the body's origin, in the world frame."""
-COUNTERS: Final = 7
-"""Evaluations, Jacobians and unsolved equations of the last force; then steps, and the sums of those three."""
-HEAD: Final = 2
-SIZE: Final = 8
 
 _BODY_MARKER, _SAND_MARKER = BODY_MARKER.encode(), SAND_MARKER.encode()
 
@@ -104,12 +83,12 @@ def _slot(data, d, instance):
 def block_of(model, data, m, d, instance):
     """The address of an instance's block; made anew where mjData lost it, as it does when it is pickled."""
     slot = _slot(data, d, instance)
-    number = registry.find(slot[0], d, instance)
+    number = claims.find(slot[0], d, instance)
     if number < 0:
         initialise(model, data, m, d, instance)
     elif number != slot[0]:
         slot[0] = number
-    return registry.address(slot[0])
+    return claims.address(slot[0])
 
 
 @njit
@@ -155,10 +134,10 @@ def initialise(model, data, m, d, instance):
     names = int32s(pointer(m + model.name_bodyadr), nbody)
     instances = int32s(pointer(m + model.name_pluginadr), pointer(m + model.nplugin))
     words = HEAD + (2 + WRENCH) * n + COUNTERS + state_size(model, m, instance)
-    number = registry.make(-1, d, instance, words)
+    number = claims.make(-1, d, instance, words)
     if number < 0:
         return -1
-    address = registry.address(number)
+    address = claims.address(number)
     blank = int64s(address, words)
     for i in range(words):
         blank[i] = 0
@@ -174,7 +153,7 @@ def initialise(model, data, m, d, instance):
             complete = complete and entries[k + 1] >= 0
             k += 2
     if not complete:
-        registry.drop(number)
+        claims.drop(number)
         return -1
     _slot(data, d, instance)[0] = number
     return 0
@@ -183,9 +162,9 @@ def initialise(model, data, m, d, instance):
 @njit
 def destroy(data, d, instance):
     """Release the block of an instance."""
-    number = registry.find(_slot(data, d, instance)[0], d, instance)
+    number = claims.find(_slot(data, d, instance)[0], d, instance)
     if number >= 0:
-        registry.drop(number)
+        claims.drop(number)
 
 
 @njit
@@ -193,8 +172,8 @@ def copy(model, data, target, m, origin, instance):
     """Give another mjData a copy of the block."""
     size = HEAD + (2 + WRENCH) * count_bodies(model, m, instance) + COUNTERS + state_size(model, m, instance)
     block = int64s(block_of(model, data, m, origin, instance), size)
-    number = registry.make(_slot(data, target, instance)[0], target, instance, size)
-    fresh = int64s(registry.address(number), size)
+    number = claims.make(_slot(data, target, instance)[0], target, instance, size)
+    fresh = int64s(claims.address(number), size)
     for i in range(size):
         fresh[i] = block[i]
     _slot(data, target, instance)[0] = number
@@ -220,24 +199,3 @@ def keep(model, data, m, d, instance):
     counted[3] += 1.0
     for k in range(3):
         counted[4 + k] += counted[k]
-
-
-def read_wrenches(number: int, owner: int, instance: int) -> list[tuple[int, tuple[float, ...]]]:
-    """Each body's id and last wrench, of the mjData at `owner` whose plugin data is `number`."""
-    n, entries, numbers = _read(number, owner, instance)
-    return [(entries[HEAD + 2 * k], tuple(numbers[WRENCH * k : WRENCH * (k + 1)])) for k in range(n)]
-
-
-def read_counters(number: int, owner: int, instance: int) -> tuple[float, ...]:
-    """Steps, evaluations, Jacobians and unsolved equations since the last reset."""
-    n, _, numbers = _read(number, owner, instance)
-    return tuple(numbers[WRENCH * n + 3 : WRENCH * n + COUNTERS])
-
-
-def _read(
-    number: int, owner: int, instance: int
-) -> "tuple[int, ctypes.Array[ctypes.c_int64], ctypes.Array[ctypes.c_double]]":
-    address = registry.read_address(number, owner, instance)
-    n = ctypes.c_int64.from_address(address).value
-    entries = (ctypes.c_int64 * (HEAD + 2 * n)).from_address(address)
-    return n, entries, (ctypes.c_double * (WRENCH * n + COUNTERS)).from_address(address + ctypes.sizeof(entries))

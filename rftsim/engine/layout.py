@@ -1,4 +1,4 @@
-"""Where the fields of mjModel and mjData lie in memory, for compiled code that is handed their addresses.
+"""What compiled code must know of MuJoCo: where the fields of its structs lie, its constants, its functions.
 
 The offsets are computed from MuJoCo's own description of its structs and then compared with the addresses that its
 NumPy views report, so that a version of MuJoCo that lays them out otherwise is refused instead of misread.
@@ -6,8 +6,10 @@ NumPy views report, so that a version of MuJoCo that lays them out otherwise is 
 
 import ctypes
 import functools
-from typing import Any, NamedTuple
+from pathlib import Path
+from typing import Any, Final, NamedTuple
 
+import llvmlite.binding as llvm
 import mujoco
 import numpy as np
 from mujoco.introspect import ast_nodes, structs
@@ -28,6 +30,31 @@ _SCALARS: dict[str, type[Any]] = {
     "mjtByte": ctypes.c_ubyte,
     "mjtBool": ctypes.c_ubyte,
 }
+
+
+CONSTANTS: Final = {
+    "euler": int(mujoco.mjtIntegrator.mjINT_EULER),
+    "rk4": int(mujoco.mjtIntegrator.mjINT_RK4),
+    "implicit": int(mujoco.mjtIntegrator.mjINT_IMPLICIT),
+    "no_euler_damping": int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP),
+    "no_damping": int(mujoco.mjtDisableBit.mjDSBL_DAMPER),
+    "passive": int(mujoco.mjtPluginCapabilityBit.mjPLUGIN_PASSIVE),
+    "equality": int(mujoco.mjtConstraint.mjCNSTR_EQUALITY),
+    "dof_friction": int(mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF),
+    "tendon_friction": int(mujoco.mjtConstraint.mjCNSTR_FRICTION_TENDON),
+    "joint_limit": int(mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT),
+    "tendon_limit": int(mujoco.mjtConstraint.mjCNSTR_LIMIT_TENDON),
+    "frictionless_contact": int(mujoco.mjtConstraint.mjCNSTR_CONTACT_FRICTIONLESS),
+    "pyramidal_contact": int(mujoco.mjtConstraint.mjCNSTR_CONTACT_PYRAMIDAL),
+    "elliptic_contact": int(mujoco.mjtConstraint.mjCNSTR_CONTACT_ELLIPTIC),
+}
+"""Those that are compiled in."""
+GIVEN: Final = repr(CONSTANTS)
+"""What machine code of the engine is made from beside its sources."""
+FUNCTIONS: Final = ("mj_fwdActuation", "mj_rne", "mj_referenceConstraint", "mj_isSparse", "mjd_smooth_vel")
+"""Those that compiled code calls by name, see `external`."""
+SYMBOL: Final = "rftsim_layout"
+"""Where it reads the offsets, int64: those of Model, Data and Contact, one after another; see `offsets`."""
 
 
 class LayoutError(ImportError):
@@ -151,6 +178,30 @@ _PROBE = """
 
 
 @functools.cache
+def library() -> ctypes.CDLL:
+    """MuJoCo's own shared library, which is loaded already."""
+    folder = Path(mujoco.__file__).parent
+    for pattern in ("libmujoco.so*", "libmujoco*.dylib", "mujoco.dll"):
+        for path in folder.glob(pattern):
+            return ctypes.CDLL(str(path))
+    raise LayoutError(f"no MuJoCo library beside {mujoco.__file__}")
+
+
+@functools.cache
+def publish() -> None:
+    """Make the offsets and MuJoCo's functions known to compiled code, for as long as the process lives.
+
+    Raises:
+        LayoutError: MuJoCo's description of its structs does not hold.
+    """
+    offsets = [offset for part in layout() for offset in part]
+    table = (ctypes.c_int64 * len(offsets))(*offsets)
+    ctypes.pythonapi.Py_IncRef(ctypes.py_object(table))
+    llvm.add_symbol(SYMBOL, ctypes.addressof(table))
+    for name in FUNCTIONS:
+        llvm.add_symbol(name, ctypes.cast(getattr(library(), name), ctypes.c_void_p).value)
+
+
 def layout() -> tuple[Model, Data, Contact]:
     """The offsets, verified.
 

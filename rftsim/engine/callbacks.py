@@ -1,0 +1,110 @@
+"""The callbacks of the two plugins, as compiled functions that MuJoCo calls; see `plugin`."""
+
+from typing import Final
+
+from numba import njit, types
+
+from rftsim import claims
+from rftsim.engine import explicit, implicit, instance, offsets
+from rftsim.engine.block import HEAD, SIZE, WRENCH
+from rftsim.engine.layout import CONSTANTS
+from rftsim.entries import address, entry
+from rftsim.memory import doubles, int32s, pointer
+from rftsim.registry import SIZE as ENTRIES
+
+_RK4: Final = CONSTANTS["rk4"]
+_PASSIVE: Final = CONSTANTS["passive"]
+
+
+@njit
+def _sense(model, data, m, d, number):
+    """Copy each body's wrench to the sensors that name it."""
+    address = instance.block_of(model, data, m, d, number)
+    table, wrenches = instance.table(address), instance.wrenches(address)
+    nsensor = pointer(m + model.nsensor)
+    plugins = int32s(pointer(m + model.sensor_plugin), nsensor)
+    objects = int32s(pointer(m + model.sensor_objid), nsensor)
+    start = int32s(pointer(m + model.sensor_adr), nsensor)
+    for sensor in range(nsensor):
+        if plugins[sensor] != number:
+            continue
+        out = doubles(pointer(d + data.sensordata) + SIZE * start[sensor], WRENCH)
+        for k in range(table[0]):
+            if table[HEAD + 2 * k] == objects[sensor]:
+                for i in range(WRENCH):
+                    out[i] = wrenches[WRENCH * k + i]
+
+
+@entry(types.intc, address, types.intc, types.intc)
+def nsensordata(m, number, sensor):
+    """Numbers of a sensor."""
+    return WRENCH
+
+
+@entry(types.intc, address, address, types.intc)
+def init(m, d, number):
+    """Make an instance's block in new data."""
+    return instance.initialise(offsets.model(), offsets.data(), m, d, number)
+
+
+@entry(types.void, address, types.intc)
+def destroy(d, number):
+    """Release it."""
+    instance.destroy(offsets.data(), d, number)
+
+
+@entry(types.void, address, address, address, types.intc)
+def copy(target, m, origin, number):
+    """Copy it to other data."""
+    instance.copy(offsets.model(), offsets.data(), target, m, origin, number)
+
+
+@entry(types.void, address, address, address, types.intc)
+def reset(m, state, memory, number):
+    """Forget what was."""
+    block = claims.address(memory) if 0 <= memory < ENTRIES else 0
+    if block != 0:
+        instance.forget(block)
+    lasting = doubles(state, instance.state_size(offsets.model(), m, number))
+    for i in range(lasting.size):
+        lasting[i] = 0.0
+
+
+@entry(types.void, address, address, types.intc)
+def advance(m, d, number):
+    """End a step."""
+    instance.keep(offsets.model(), offsets.data(), m, d, number)
+
+
+@entry(types.intc, address, types.intc)
+def explicit_nstate(m, number):
+    """Numbers that last from step to step."""
+    return 0
+
+
+@entry(types.void, address, address, types.intc, types.intc)
+def explicit_compute(m, d, number, capability):
+    """The passive force at the velocity of the moment, or the sensors."""
+    model, data = offsets.model(), offsets.data()
+    if capability == _PASSIVE:
+        explicit.press(model, data, m, d, number)
+    else:
+        _sense(model, data, m, d, number)
+
+
+@entry(types.intc, address, types.intc)
+def implicit_nstate(m, number):
+    """Numbers that last from step to step."""
+    return instance.wanted_state(offsets.model(), m, number)
+
+
+@entry(types.void, address, address, types.intc, types.intc)
+def implicit_compute(m, d, number, capability):
+    """The passive force at the end of the step, or the sensors; under RK4 as the explicit one."""
+    model, data = offsets.model(), offsets.data()
+    if capability != _PASSIVE:
+        _sense(model, data, m, d, number)
+    elif int32s(m + model.opt_integrator, 1)[0] == _RK4:
+        explicit.press(model, data, m, d, number)
+    else:
+        implicit.press(model, data, offsets.contact(), m, d, number)

@@ -1,0 +1,61 @@
+"""The laws' loops as functions of plain addresses.
+
+Addresses are of packed sand, packed surface, xpos (3,), xmat (9,), and so on, all float64.
+"""
+
+from numba import njit, types
+
+from rftsim import kernels, packed, unpack
+from rftsim.entries import address, entry
+from rftsim.memory import doubles, matrix
+
+
+@njit(forceinline=True)
+def surface_at(place):
+    """The packed surface at an address."""
+    return doubles(place, unpack.size_of(doubles(place, packed.HEADER)))
+
+
+@entry(types.void, *[address] * 7)
+def wrench(sand, surface, xpos, xmat, velocity, omega, out):
+    """Force and moment about the body's origin, world frame, (6,), at the velocity of the moment."""
+    s, body = doubles(sand, packed.SAND_SIZE), surface_at(surface)
+    x, r, v, w = doubles(xpos, 3), doubles(xmat, 9), doubles(velocity, 3), doubles(omega, 3)
+    total = doubles(out, 6)
+    for k in range(6):
+        total[k] = 0.0
+    if unpack.is_clear(s, body, x, r):
+        return
+    f, medium = unpack.frame_of(s, body, x, r, v, w), unpack.medium_of(s, body)
+    cx, cy, cz, nx, ny, nz, area = unpack.columns(body)
+    last = 0
+    while last < area.size:
+        first, last = unpack.next_run(body, last, area.size, f, 0.0)
+        if s[0] == 0.0:
+            g = kernels.sums_2d(cx, cy, cz, nx, ny, nz, area, first, last, f, medium)
+        elif s[0] == 1.0:
+            g = kernels.sums_3d(cx, cy, cz, nx, ny, nz, area, first, last, f, medium)
+        else:
+            g = kernels.sums_3d_quartic(cx, cy, cz, nx, ny, nz, area, first, last, f, medium)
+        for part in range(0, 6, 3):
+            a, b, c = unpack.to_world(r, g[part], g[part + 1], g[part + 2])
+            total[part] += a
+            total[part + 1] += b
+            total[part + 2] += c
+
+
+@entry(types.void, *[address] * 8)
+def tractions(sand, surface, xpos, xmat, velocity, omega, stress, depth):
+    """Stress of each triangle in the body frame, (ntri, 3), and effective depth, (ntri,)."""
+    s, body = doubles(sand, packed.SAND_SIZE), surface_at(surface)
+    x, r, v, w = doubles(xpos, 3), doubles(xmat, 9), doubles(velocity, 3), doubles(omega, 3)
+    f, medium = unpack.frame_of(s, body, x, r, v, w), unpack.medium_of(s, body)
+    cx, cy, cz, nx, ny, nz, area = unpack.columns(body)
+    n = area.size
+    stress_out, depth_out = matrix(stress, n, 3), doubles(depth, n)
+    if s[0] == 0.0:
+        kernels.tractions_2d(cx, cy, cz, nx, ny, nz, f, medium, stress_out, depth_out)
+    elif s[0] == 1.0:
+        kernels.tractions_3d(cx, cy, cz, nx, ny, nz, f, medium, stress_out, depth_out)
+    else:
+        kernels.tractions_3d_quartic(cx, cy, cz, nx, ny, nz, f, medium, stress_out, depth_out)
