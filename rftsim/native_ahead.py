@@ -94,14 +94,14 @@ def jacobian(sand, surface, frame, xmat, twist, completed, out):
     for i in range(6):
         for k in range(6):
             local[i, k] = 0.0
-    for first in range(0, count, kernels.BLOCK):
-        if unpack.block_is_clear(body, first // kernels.BLOCK, f, 0.0):
+    for first in range(0, count, packed.BLOCK):
+        if unpack.block_is_clear(body, first // packed.BLOCK, f, 0.0):
             continue
         for column in range(packed.COLUMNS):
             start = packed.HEADER + column * count + first
-            for i in range(kernels.BLOCK):  # past the last triangle, ones without area
+            for i in range(packed.BLOCK):  # past the last triangle, ones without area
                 value = body[start + i] if first + i < count else 0.0
-                scratch[kernels.COLUMNS_AT + column * kernels.BLOCK + i] = value
+                scratch[kernels.COLUMNS_AT + column * packed.BLOCK + i] = value
         if s[0] == 0.0:
             kernels.jacobian_2d(f, medium, V_C, completed, scratch, local)
         elif s[0] == 1.0:

@@ -88,9 +88,7 @@ def ship() -> None:
     package = types.ModuleType("rftsim")  # instead of the package, which would compile for this machine first
     package.__path__ = [str(Path(__file__).parent)]
     sys.modules["rftsim"] = package
-    from rftsim import machine_code
-    from rftsim.engine import layout
-
+    machine_code, layout = (importlib.import_module(f"rftsim.{name}") for name in ("machine_code", "engine.layout"))
     numba.config.CPU_NAME, numba.config.CPU_FEATURES = machine_code.SHIPPED_FOR, ""
     layout.publish()
     for part, given in (("law", ""), ("engine", layout.GIVEN)):

@@ -2,12 +2,10 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
-import matplotlib.image
 import mujoco
 import numpy as np
-from matplotlib.figure import Figure
 
 from rftsim.bench.kernel import Arithmetic, Cost
 from rftsim.bench.stability import FORCES, Row
@@ -43,9 +41,15 @@ LOST = 10.0
 """Relative error at which a simulation counts as lost in pictures."""
 
 
+def _figure(size: tuple[float, float]) -> Any:
+    from matplotlib.figure import Figure  # not before it is needed: it takes a second
+
+    return Figure(figsize=size, layout="constrained")
+
+
 def plot_history(history: History, title: str, path: Path) -> None:
     """Draw speed, sinkage, force and power against time."""
-    figure = Figure(figsize=(8, 9), layout="constrained")
+    figure = _figure((8, 9))
     axes = figure.subplots(4, 1, sharex=True)
     axes[0].plot(history.time, history.speed)
     axes[0].set_ylabel("speed [m/s]")
@@ -68,7 +72,7 @@ def plot_history(history: History, title: str, path: Path) -> None:
 def plot_demo(points: list[Point], path: Path) -> None:
     """Draw speed and sinkage against spin, a column per scene, as [Agarwal] Figs. 4-7 and 4-9 do."""
     scenes = list(dict.fromkeys(point.scene for point in points))
-    figure = Figure(figsize=(11, 7.5), layout="constrained")
+    figure = _figure((11, 7.5))
     axes = figure.subplots(2, len(scenes), sharex="col", squeeze=False)
     styles = {"rft2d": ("C0", "--"), "drft2d": ("C0", "-"), "rft3d": ("C1", "--"), "drft3d": ("C1", "-")}
     for column, scene in enumerate(scenes):
@@ -94,12 +98,14 @@ def save_picture(model: mujoco.MjModel, data: mujoco.MjData, body: str, path: Pa
     mujoco.mj_forward(model, data)
     camera = watching(model, data, body)
     picture = render(model, data, camera=camera, arrows=camera.distance / 10)
+    import matplotlib.image
+
     matplotlib.image.imsave(path, picture)
 
 
 def plot_stability(rows: list[Row], path: Path) -> None:
     """Draw the hard cases' error against the time step and against the time spent."""
-    figure = Figure(figsize=(11, 5), layout="constrained")
+    figure = _figure((11, 5))
     left, right = figure.subplots(1, 2, sharey=True)
     for force in FORCES:
         colour = {"implicit": "C0", "explicit": "C3"}[force]
@@ -128,14 +134,14 @@ def plot_stability(rows: list[Row], path: Path) -> None:
 
 def plot_study(study: Study, measured: Measured, path: Path) -> None:
     """Draw a study of `rftsim validate`."""
-    figure = Figure(figsize=study.size, layout="constrained")
+    figure = _figure(study.size)
     study.draw(measured, figure)
     figure.savefig(path, dpi=110)
 
 
 def plot_kernel(costs: list[Cost], limit: Arithmetic, path: Path) -> None:
     """Draw the time of an evaluation against the number of triangles."""
-    figure = Figure(figsize=(7, 4.5), layout="constrained")
+    figure = _figure((7, 4.5))
     axis = figure.subplots()
     sizes = np.array([cost.triangles for cost in costs])
     axis.loglog(
@@ -152,7 +158,7 @@ def plot_kernel(costs: list[Cost], limit: Arithmetic, path: Path) -> None:
 
 def plot_returns(scores: "Mapping[str, Sequence[Score]]", path: Path) -> None:
     """Draw the mean return of each actor on each ground, with its standard deviation over the episodes."""
-    figure = Figure(figsize=(9, 1.2 + 3.4 * len(scores)), layout="constrained")
+    figure = _figure((9, 1.2 + 3.4 * len(scores)))
     panels = figure.subplots(len(scores), 1, squeeze=False)[:, 0]
     for axis, (title, own) in zip(panels, scores.items(), strict=True):
         grounds, actors = (

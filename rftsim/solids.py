@@ -33,7 +33,8 @@ _CUBE: Final = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for
 
 def box(extents: Array) -> Array:
     """A box."""
-    return _CUBE * extents
+    triangles: Array = _CUBE * extents
+    return triangles
 
 
 def ball(subdivisions: int) -> Array:
@@ -75,7 +76,8 @@ def revolved(profile: Array, sections: int) -> Array:
     upper = np.stack([here[:, 1:], onward[:, :-1], onward[:, 1:]], axis=2)
     triangles = np.stack([lower, upper], axis=2).reshape(-1, 3, 3)
     double = np.linalg.norm(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=1)
-    return triangles[double > 2e-8 * np.ptp(profile) ** 2]
+    kept: Array = triangles[double > 2e-8 * np.ptp(profile) ** 2]
+    return kept
 
 
 def volume(triangles: Array) -> float:

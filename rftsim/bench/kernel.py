@@ -11,14 +11,12 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, Final, NamedTuple
 
-import numba  # not `from`: what measures the package is not part of what its compiled code is cached under
 import numpy as np
-import trimesh
 
-from rftsim import kernels, native
+from rftsim import solids
 from rftsim.economy import middle
 from rftsim.laws import get_law
-from rftsim.packed import BLOCK, COLUMNS, frame_of, medium_of, pack_sand, pack_surface, read_columns
+from rftsim.packed import BLOCK, COLUMNS, pack_sand, pack_surface, read_columns
 from rftsim.sand import FreeSurface, Sand
 from rftsim.surface import Array, Surface
 
@@ -86,6 +84,8 @@ def measure(sizes: tuple[int, ...], oracle: ModuleType | None, report: Callable[
         oracle: The tests' laws in NumPy, if they are to be timed, too.
         report: Called with what is done, ROUNDS times.
     """
+    from rftsim.bench import loops  # which numba compiles
+
     sand = pack_sand(SAND, get_law(LAW), FreeSurface(), (0.0, 1.0, 0.0))
     works: list[Callable[[int], Any]] = []
     sizes_in_bytes = []
@@ -93,7 +93,7 @@ def measure(sizes: tuple[int, ...], oracle: ModuleType | None, report: Callable[
         surface = _ball(size)
         body = pack_surface(surface)
         sizes_in_bytes.append(body.nbytes)
-        works.append(functools.partial(_evaluate, sand, body, *_motion(surface), np.empty(6)))
+        works.append(functools.partial(loops.evaluate, sand, body, *_motion(surface), np.empty(6)))
         if oracle is not None and size <= LITERAL:
             works.append(functools.partial(_literal, oracle, surface))
     seconds = iter(_least(works, report))
@@ -107,13 +107,15 @@ def measure(sizes: tuple[int, ...], oracle: ModuleType | None, report: Callable[
 
 def arithmetic() -> Arithmetic:
     """The law's operations, counted in the machine code of its loop, and the time that they take at least."""
+    from rftsim.bench import loops  # which numba compiles
+
     sand = pack_sand(SAND, get_law(LAW), FreeSurface(), (0.0, 1.0, 0.0))
     surface = _ball(BLOCK)
     body = pack_surface(surface)
-    _sums(sand, body, *read_columns(body), *_motion(surface))
-    operations = _count(next(iter(_sums.inspect_asm().values())))
+    loops.sums(sand, body, *read_columns(body), *_motion(surface))
+    operations = _count(next(iter(loops.sums.inspect_asm().values())))
     numbers = np.linspace(0.0, 0.5, 512)
-    (seconds,) = _least([functools.partial(_polynomials, numbers, np.empty(numbers.size))], lambda _: None)
+    (seconds,) = _least([functools.partial(loops.polynomials, numbers, np.empty(numbers.size))], lambda _: None)
     return Arithmetic(operations, 1e9 * operations * seconds / (numbers.size * _OPERATIONS))
 
 
@@ -146,8 +148,7 @@ def load_oracle(path: Path) -> ModuleType | None:
 def _ball(size: int) -> Surface:
     """`size` triangles of a sphere of 0.1 m."""
     level = max(math.ceil(math.log(size / 20, 4)), 0)
-    mesh = trimesh.creation.icosphere(subdivisions=level, radius=0.1)
-    return Surface(np.array(mesh.triangles[:size], dtype=float)).clustered(BLOCK)
+    return Surface(0.1 * solids.ball(level)[:size]).clustered(BLOCK)
 
 
 def _motion(surface: Surface) -> tuple[Array, Array, Array, Array]:
@@ -181,48 +182,6 @@ def _least(works: list[Callable[[int], Any]], report: Callable[[str], Any]) -> l
             least[k] = min(least[k], elapsed(work, count))
         report(f"round {number + 1}")
     return least
-
-
-_wrench = native.wrench
-
-
-@numba.njit
-def _evaluate(sand, body, position, turn, velocity, omega, out, count):
-    for _ in range(count):
-        _wrench(
-            sand.ctypes.data,
-            body.ctypes.data,
-            position.ctypes.data,
-            turn.ctypes.data,
-            velocity.ctypes.data,
-            omega.ctypes.data,
-            out.ctypes.data,
-        )
-
-
-@numba.njit(fastmath=kernels.FASTMATH, error_model="numpy")
-def _sums(sand, body, cx, cy, cz, nx, ny, nz, area, position, turn, velocity, omega):
-    frame, medium = frame_of(sand, body, position, turn, velocity, omega), medium_of(sand, body)
-    return kernels.sums_3d(cx, cy, cz, nx, ny, nz, area, 0, area.size, frame, medium)
-
-
-@numba.njit(fastmath={"contract"}, forceinline=True)
-def _eight(a, y):
-    a = (((a * y + 0.25) * y + 0.25) * y + 0.25) * y + 0.25
-    return (((a * y + 0.25) * y + 0.25) * y + 0.25) * y + 0.25
-
-
-@numba.njit(fastmath={"contract"}, error_model="numpy")
-def _polynomials(x, out, count):
-    """Four polynomials in each number, none of which waits for another."""
-    for _ in range(count):
-        for i in range(x.size):
-            y = x[i]
-            a = _eight(_eight(y, y), y)
-            b = _eight(_eight(y + 0.1, y), y)
-            c = _eight(_eight(y + 0.2, y), y)
-            d = _eight(_eight(y + 0.3, y), y)
-            out[i] = a + b + c + d
 
 
 def _count(assembly: str) -> float:

@@ -132,7 +132,7 @@ class Study:
 
     def __init__(self, path: Path) -> None:
         cases = Path(hard_cases.__file__).read_bytes() + Path(__file__).read_bytes()
-        self.kept = Kept(path, SOURCE.encode() + cases + mujoco.__version__.encode())
+        self.kept = Kept(path, SOURCE + cases + mujoco.__version__.encode())
 
     def played(self, case: str, h: float, force: Force) -> Played:
         """A case, played now or before."""

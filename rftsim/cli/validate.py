@@ -5,7 +5,7 @@ import math
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import tyro
 from rich.console import Console
@@ -18,8 +18,10 @@ from rftsim.errors import RftsimError
 from rftsim.files import check_writable, replacing
 from rftsim.plots import plot_study
 from rftsim.validation.measured import DATA
-from rftsim.validation.studies import STUDIES, Found, choose, run
 from rftsim.validation.study import Request, Row
+
+if TYPE_CHECKING:
+    from rftsim.validation.studies import Found
 
 MARKS = {True: "pass", False: "FAIL", None: "-"}
 
@@ -52,6 +54,8 @@ class Validate:
 
     def __call__(self, warnings: Callable[[], list[str]]) -> None:
         """Measure, print and draw."""
+        from rftsim.validation.studies import choose  # which takes the continuum, and that numba
+
         names = choose(self.studies)
         if self.json and self.markdown:
             raise RftsimError("--json and --markdown exclude one another: give one")
@@ -77,7 +81,9 @@ class Validate:
         if any(row.passed is False for one in found for row in one.rows):
             sys.exit(1)
 
-    def _measure(self, names: list[str]) -> list[Found]:
+    def _measure(self, names: list[str]) -> "list[Found]":
+        from rftsim.validation.studies import STUDIES, run
+
         request = Request(self.quick, self.data or DATA)
         total = sum(len(STUDIES[name].jobs(request)) for name in names)
         columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
@@ -114,7 +120,7 @@ def _cells(row: Row) -> list[str]:
 HEADER = ("quantity", "expected", "got", "error", "verdict", "source")
 
 
-def _print(found: list[Found], pictures: dict[str, Path]) -> None:
+def _print(found: "list[Found]", pictures: dict[str, Path]) -> None:
     console = Console()
     for one in found:
         table = Table(title=f"{one.name}: {escape(one.study.says)}", title_justify="left")
@@ -135,7 +141,7 @@ def _print(found: list[Found], pictures: dict[str, Path]) -> None:
         console.print(f"wrote {', '.join(map(str, pictures.values()))}", highlight=False, soft_wrap=True)
 
 
-def _markdown(found: list[Found]) -> list[str]:
+def _markdown(found: "list[Found]") -> list[str]:
     lines = [("study", *HEADER), ("---", "---", "---:", "---:", "---:", "---", "---")]
     for one in found:
         for k, row in enumerate(one.rows):

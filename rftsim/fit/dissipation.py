@@ -12,8 +12,6 @@ from functools import lru_cache
 from typing import Final
 
 import numpy as np
-from scipy.linalg import solve_triangular
-from scipy.optimize import nnls
 
 from rftsim.errors import RftsimError
 from rftsim.fit.polynomials import terms
@@ -107,6 +105,9 @@ def dissipative(a: Array, rhs: Array, start: Array, degree: int) -> Array:
 
 def _least(r: Array, q: Array, cuts: Array) -> Array:
     """The x of least |r x - q| under cuts x <= -MARGIN: least distance programming, Lawson and Hanson ch. 23."""
+    from scipy.linalg import solve_triangular  # not before it is needed: it takes a second
+    from scipy.optimize import nnls
+
     turned = -solve_triangular(r, cuts.T, trans="T").T
     bound = MARGIN - turned @ q
     e = np.vstack([turned.T, bound])

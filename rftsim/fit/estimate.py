@@ -3,7 +3,6 @@
 from typing import Final, NamedTuple
 
 import numpy as np
-from scipy.stats import t
 
 from rftsim.errors import RftsimError
 from rftsim.surface import Array
@@ -46,6 +45,8 @@ def estimate(columns: Array, y: Array, tests: Array | None = None, *, draws: int
         raise RftsimError(f"{n} rows are too few for {p} coefficients and their intervals: give {p + 1} or more")
     c, *_ = np.linalg.lstsq(columns, y)
     variance = ((y - columns @ c) ** 2).sum() / (n - p)
+    from scipy.stats import t  # not before it is needed: it takes a second
+
     reach = t.ppf(0.5 + CONFIDENCE / 2, n - p) * np.sqrt(variance * np.diag(np.linalg.inv(columns.T @ columns)))
     apart = tests is not None and len(np.unique(tests)) > 2
     boot = _bootstrap(columns, y, tests if apart and tests is not None else np.arange(n, dtype=float), draws)

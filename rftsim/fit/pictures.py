@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from rftsim.fit.plates import Plates
 from rftsim.fit.report import Report, predict
@@ -13,6 +12,8 @@ from rftsim.fit.trials import Found
 
 def plot_map(report: Report, title: str, path: Path) -> None:
     """Draw the law against the plates: everything at once, and in plane over the direction of motion."""
+    from matplotlib.figure import Figure  # not before it is needed, as in `plots`
+
     figure = Figure(figsize=(15, 5.5), layout="constrained")
     parity, *sections = figure.subplots(1, 3)
     xi_n, plates = report.generic.xi_n, report.plates
@@ -62,6 +63,8 @@ def _often(tilts: Any, most: int = 7) -> list[float]:
 
 def plot_trial(found: Found, title: str, path: Path) -> None:
     """Draw a trial's readings, and what was fitted to them."""
+    from matplotlib.figure import Figure  # not before it is needed, as in `plots`
+
     figure = Figure(figsize=(7, 5), layout="constrained")
     axis = figure.subplots()
     order = np.argsort(found.x)

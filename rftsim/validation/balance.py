@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 from rftsim_models.wheels import WheelParameters
-from scipy.optimize import root
 
 from rftsim.errors import RftsimError
 from rftsim.sand import Sand
@@ -32,6 +31,8 @@ def steady(wheel: WheelParameters, force: Callable[[float, float], tuple[float, 
     def unbalanced(state: Any) -> list[float]:
         drawbar, load = force(float(state[0]), float(state[1]) * 2 * wheel.outer_radius)
         return [(drawbar + wheel.forward_force) / weight, load / weight - 1.0]
+
+    from scipy.optimize import root  # not before it is needed: it takes a second
 
     found = root(unbalanced, [0.85, 0.17], options={"eps": 1e-4})
     if np.abs(found.fun).max() > 1e-3:

@@ -4,7 +4,6 @@ from collections.abc import Callable
 from typing import Any, Final
 
 import numpy as np
-import trimesh
 from rftsim_models.outline import extruded
 
 from rftsim.rigid import SurfaceForce, surface_force
@@ -29,6 +28,8 @@ CUT_OFF: Final = 0.0048
 
 def lying() -> Surface:
     """The cylinder of the other program, its axis along y."""
+    import trimesh  # not before it is needed: it takes a second
+
     mesh = trimesh.creation.cylinder(radius=RADIUS, height=LENGTH, sections=24)
     return make_surface(mesh.vertices[:, [0, 2, 1]], mesh.faces).refined(0.01)
 
@@ -48,6 +49,8 @@ def curvature_radius(surface: Surface) -> Array:
     Discrete principal curvatures H ± (H² - K)^1/2, with the mean curvature H by the cotangent formula and Gauss's K by
     the angle deficit, each over a third of the area of the triangles around.
     """
+    import trimesh
+
     mesh = trimesh.Trimesh(*_welded(surface), process=False)
     corners = mesh.triangles
     angles = mesh.face_angles

@@ -5,7 +5,6 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 from rftsim_models.wheels import GROUSER_WHEEL
-from scipy.optimize import brentq
 
 from rftsim.sand import PRESETS
 from rftsim.surface import Array
@@ -110,6 +109,8 @@ def sinkage_under(
         return wheel_force(soil, radius, width, sinkage, rim, velocity).load - load
 
     deepest = 0.999 * radius
+    from scipy.optimize import brentq  # not before it is needed: it takes a second
+
     return float(brentq(excess, 1e-4 * radius, deepest)) if excess(deepest) > 0.0 else radius
 
 
