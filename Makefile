@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
 export MUJOCO_GL ?= egl
 
-.PHONY: demo test check unit readme test-slow test-mujoco4 clean
+.PHONY: demo test check unit readme native test-slow test-mujoco4 clean
 
 demo: $(VENV)/run
 	$(BIN)/rftsim demo
@@ -24,6 +24,10 @@ unit: $(VENV)/ready
 
 readme: $(VENV)/ready
 	$(BIN)/python tests/readme.py
+
+# The machine code that ships, after an edit of what is compiled.
+native: $(VENV)/ready
+	$(BIN)/python -P rftsim/native_build.py
 
 test-slow: $(VENV)/ready
 	$(BIN)/pytest -m slow

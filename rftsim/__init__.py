@@ -9,5 +9,5 @@ from rftsim.sand import PRESETS, FreeSurface, Sand, make_sand
 from rftsim.scene import Bed, add_sand, load
 from rftsim.surface import Surface, Wheel, load_surface, make_surface
 
-for _name in (_plugin.EXPLICIT, _plugin.IMPLICIT):
-    _plugin.register(_name)
+_plugin.register(_plugin.EXPLICIT)
+_plugin.register(_plugin.IMPLICIT)

@@ -4,16 +4,28 @@ import hashlib
 from pathlib import Path
 from typing import Final
 
-_HERE: Final = Path(__file__).parent
-_BESIDES: Final = ("engine/block.py", "engine/layout.py", "packed.py", "registry.py", "tables.py")
-"""Files whose constants are compiled in, beside those that import numba."""
-
-
-def _is_compiled(path: Path, text: bytes) -> bool:
-    return b"\nfrom numba import" in text or path.relative_to(_HERE).as_posix() in _BESIDES
-
-
-_TEXTS: Final = {path: path.read_bytes() for path in sorted(_HERE.rglob("*.py"))}
-FILES: Final = tuple(path for path, text in _TEXTS.items() if _is_compiled(path, text))
-SOURCE: Final = hashlib.sha256(b"".join(_TEXTS[path] for path in FILES)).digest()
+FILES: Final = tuple(
+    Path(__file__).parent / name
+    for name in (
+        "claims.py",
+        "dense.py",
+        *(f"engine/{name}.py" for name in ("block", "bodies", "callbacks", "explicit", "external", "implicit")),
+        *(f"engine/{name}.py" for name in ("instance", "layout", "offsets")),
+        "entries.py",
+        "equation.py",
+        "implicit.py",
+        "kernels.py",
+        "memory.py",
+        *(f"native_{name}.py" for name in ("ahead", "build", "law", "solver", "step")),
+        "packed.py",
+        "registry.py",
+        "rows.py",
+        "state.py",
+        "stepping.py",
+        "tables.py",
+        "unpack.py",
+    )
+)
+"""The modules that import numba, and those whose constants they take."""
+SOURCE: Final = hashlib.sha256(b"".join(path.read_bytes() for path in FILES)).digest()
 """Identifies it."""

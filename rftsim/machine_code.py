@@ -4,13 +4,14 @@ It is made by `native_build` in parts, each an object file of LLVM. What ships i
 from these very sources; then neither numba nor a cache is needed.
 """
 
+import ctypes
 import functools
 import hashlib
 import logging
 import lzma
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
@@ -21,6 +22,7 @@ from rftsim.compiled import SOURCE
 
 SHIPPED: Final = Path(__file__).parent / "shipped"
 SHIPPED_FOR: Final = "x86-64-v3"
+_LOG: Final = logging.getLogger(__name__)
 _FEATURES: Final = ("avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe")
 
 
@@ -36,7 +38,7 @@ def load(part: str, given: str = "") -> Callable[[str], int]:
         What gives an entry's address by name.
     """
     engine = _engine()
-    engine.add_object_file(llvm.ObjectFileRef.from_data(_object(part, given)))
+    engine.add_object_file(llvm.ObjectFileRef.from_data(object_file(part, given)))
     engine.finalize_object()
 
     def address(name: str) -> int:
@@ -47,31 +49,39 @@ def load(part: str, given: str = "") -> Callable[[str], int]:
     return address
 
 
+def _failed(name: bytes) -> None:
+    """Called by machine code that met what Python would raise an error for."""
+    _LOG.error("%s divided by zero or the like; this force of the sand is not to be trusted", name.decode())
+
+
+_FAILED: Final = ctypes.CFUNCTYPE(None, ctypes.c_char_p)(_failed)
+
+
 @functools.cache
 def _engine() -> llvm.ExecutionEngine:
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
+    llvm.add_symbol("rftsim_failed", ctypes.cast(_FAILED, ctypes.c_void_p).value)
     machine = llvm.Target.from_default_triple().create_target_machine(jit=True)
     return llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
 
 
-def _object(part: str, given: str) -> bytes:
+def object_file(part: str, given: str) -> bytes:
     """A part's object file."""
     key = key_of(given)
-    if _takes_shipped() and (code := _read(shipped_file(part), key)) is not None:
+    if takes_shipped() and (code := _read(shipped_file(part), key)) is not None:
         return code
     machine = f"{llvm.get_host_cpu_name()} {llvm.get_host_cpu_features().flatten()} {llvmlite.__version__}"
     key = hashlib.sha256(key + machine.encode()).digest()
     name = f"rftsim-{part}-{key.hex()[:16]}.o.xz"
-    folders = list(_folders())
-    for folder in folders:
+    for folder in folders():
         if (code := _read(folder / name, key)) is not None:
             return code
-    logging.getLogger(__name__).warning("rftsim: compiling (%s), once for this machine; a minute or two", part)
+    _LOG.warning("rftsim compiles its %s for this machine, once; it takes a minute or two", part)
     from rftsim.native_build import build  # which needs numba
 
     code = build(part)
-    for folder in folders:
+    for folder in folders():
         if write(folder / name, key, code):
             break
     return code
@@ -87,7 +97,7 @@ def shipped_file(part: str) -> Path:
     return SHIPPED / f"{part}-{SHIPPED_FOR}.o.xz"
 
 
-def _takes_shipped() -> bool:
+def takes_shipped() -> bool:
     """Whether this process can run what ships."""
     triple = llvm.get_process_triple()
     if not (triple.startswith("x86_64") and "linux" in triple):
@@ -96,16 +106,14 @@ def _takes_shipped() -> bool:
     return all(features.get(name, False) for name in _FEATURES)
 
 
-def _folders() -> Iterator[Path]:
+def folders() -> list[Path]:
     """Where compiled code may be kept, by numba's convention."""
     if chosen := os.environ.get("NUMBA_CACHE_DIR"):
-        yield Path(chosen)
-        return
-    yield Path(__file__).parent / "__pycache__"
+        return [Path(chosen)]
     users = {"darwin": "~/Library/Caches", "win32": "~/AppData/Local"}.get(sys.platform, "~/.cache")
     users = os.path.expanduser(os.environ.get("XDG_CACHE_HOME") or users)
-    if os.path.isabs(users):
-        yield Path(users) / "numba"
+    own = Path(__file__).parent / "__pycache__"
+    return [own, Path(users) / "numba"] if os.path.isabs(users) else [own]  # else it knows no home
 
 
 def _read(path: Path, key: bytes) -> bytes | None:

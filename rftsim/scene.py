@@ -110,7 +110,6 @@ def add_sand(
     bodies = [bodies] if isinstance(bodies, str) else bodies
     wheels = [wheels] if isinstance(wheels, str) else wheels
     plugin_name = plugin.IMPLICIT if force == "implicit" else plugin.EXPLICIT
-    plugin.register(plugin_name)
     bed_sand, bed_law = make_sand(sand), get_law(law)
     free_surface = surface if isinstance(surface, FreeSurface) else FreeSurface(height=surface)
     numbers = packed.pack_sand(bed_sand, bed_law, free_surface, plane)

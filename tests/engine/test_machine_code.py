@@ -1,0 +1,177 @@
+"""The machine code: made from these sources, at once there, the same as compiled here, and in need of no cache."""
+
+import ast
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rftsim
+from rftsim import compiled, machine_code, native_build
+from rftsim.engine import layout
+
+PACKAGE = Path(rftsim.__file__).parent
+MODELS = Path(__file__).parents[2] / "models"
+PARTS = {"law": "", "engine": layout.GIVEN}
+
+FIRST_FORCE = """
+import json, sys, time
+import mujoco
+import rftsim
+from rftsim_models import wheels
+
+spec = wheels.build_wheel(wheels.GROUSER_WHEEL, 30.0)
+rftsim.add_sand(spec)
+model = spec.compile()
+data = mujoco.MjData(model)
+data.qpos[model.joint("z").qposadr] = -0.02
+while data.time < 0.02:
+    mujoco.mj_step(model, data)
+seconds = time.process_time()
+heavy = {"numba", "scipy", "trimesh", "networkx", "matplotlib"} & set(sys.modules)
+wrench = rftsim.wrenches(model, data).force[model.body("wheel").id]
+numbers = [*data.qpos, *data.qvel, *wrench]
+print(json.dumps({"seconds": seconds, "heavy": sorted(heavy), "numbers": numbers, "from": rftsim.__file__}))
+"""
+
+
+def first_force(folder, **environment):
+    """What a fresh process prints that takes rftsim from a folder."""
+    path = os.pathsep.join([str(folder), str(MODELS)])
+    variables = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
+    found = subprocess.run(
+        [sys.executable, "-c", FIRST_FORCE],
+        cwd=folder,
+        env={**variables, "PYTHONPATH": path, **environment},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert found.returncode == 0, found.stderr
+    return json.loads(found.stdout)
+
+
+@pytest.fixture
+def fresh(tmp_path):
+    """A folder with a copy of the package in which nothing is cached."""
+    shutil.copytree(PACKAGE, tmp_path / "fresh" / "rftsim", ignore=shutil.ignore_patterns("__pycache__"))
+    return tmp_path / "fresh"
+
+
+@pytest.mark.parametrize("part", PARTS)
+def test_what_ships_was_made_from_these_sources(part):
+    """Its key is that of the sources, and of MuJoCo's constants."""
+    key = machine_code.key_of(PARTS[part])
+    shipped = machine_code.shipped_file(part).read_bytes()
+    assert shipped.startswith(key), "compiled code was edited: `make native` makes its machine code anew"
+    assert len(shipped) < 200_000
+
+
+def test_every_source_of_machine_code_counts():
+    """The key has each module that imports numba, and whatever of rftsim such a module imports."""
+    files = {path.relative_to(PACKAGE).as_posix() for path in compiled.FILES}
+    for path in PACKAGE.rglob("*.py"):
+        name, text = path.relative_to(PACKAGE).as_posix(), path.read_text()
+        if "\nfrom numba import" not in text:
+            continue
+        assert name in files, f"{name} imports numba and is not among compiled.FILES"
+        for node in ast.walk(ast.parse(text)):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("rftsim"):
+                parts = (node.module or "").split(".")[1:]
+                for alias in node.names:
+                    inner = "/".join([*parts, alias.name]) + ".py"
+                    found = inner if (PACKAGE / inner).exists() else "/".join(parts) + ".py"
+                    assert found in files, f"{name} imports {found}, which is not among compiled.FILES"
+
+
+@pytest.mark.skipif(not machine_code.takes_shipped(), reason="what ships is for another processor")
+def test_first_force_compiles_nothing(fresh):
+    """3 s of the processor in a fresh process with nothing cached, 1.5 s with Python's own cache; no cache of ours."""
+    (fresh / "cache").mkdir()
+    first = first_force(fresh, NUMBA_CACHE_DIR=str(fresh / "cache"))
+    again = first_force(fresh, NUMBA_CACHE_DIR=str(fresh / "cache"))
+    assert first["from"].startswith(str(fresh))
+    assert first["heavy"] == []
+    assert first["seconds"] < 3.0
+    assert again["seconds"] < 1.5
+    assert not list((fresh / "cache").iterdir())
+
+
+def test_force_needs_no_home_and_no_folder_to_write_to(fresh):
+    """The same numbers where neither the home nor the package can be written to."""
+    shutil.copytree(PACKAGE / "__pycache__", fresh / "rftsim" / "__pycache__", dirs_exist_ok=True)
+    for path in (*fresh.rglob("*"), fresh):
+        path.chmod(0o555 if path.is_dir() else 0o444)
+    try:
+        found = first_force(fresh, HOME="/nonexistent", PYTHONDONTWRITEBYTECODE="1")
+    finally:
+        for path in (fresh, *fresh.rglob("*")):
+            path.chmod(0o755 if path.is_dir() else 0o644)
+    assert found["numbers"] == first_force(PACKAGE.parent)["numbers"]
+
+
+@pytest.fixture
+def compiler(monkeypatch):
+    """What ships does not fit, and compiling is counted instead of done."""
+    made = []
+
+    def build(part):
+        made.append(part)
+        return b"machine code of " + part.encode()
+
+    monkeypatch.setattr(machine_code, "takes_shipped", lambda: False)
+    monkeypatch.setattr(native_build, "build", build)
+    return made
+
+
+def test_what_was_compiled_is_kept_where_numba_keeps_its_cache(compiler, tmp_path, monkeypatch, caplog):
+    """Once for NUMBA_CACHE_DIR, and anew where the file is not whole or was made from something else."""
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    for _ in range(2):
+        assert machine_code.object_file("law", "") == b"machine code of law"
+    assert compiler == ["law"]
+    assert len(caplog.records) == 1
+    (kept,) = tmp_path.iterdir()
+    kept.write_bytes(kept.read_bytes()[:-5])
+    machine_code.object_file("law", "")
+    machine_code.object_file("law", "other constants")
+    machine_code.object_file("law", "")
+    assert compiler == ["law"] * 3
+
+
+def test_no_folder_to_write_to_is_no_error(compiler, tmp_path, monkeypatch):
+    """It compiles each time."""
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "file" / "cache"))
+    for _ in range(2):
+        assert machine_code.object_file("law", "") == b"machine code of law"
+    assert compiler == ["law", "law"]
+
+
+def test_users_cache_follows_the_package(compiler, tmp_path, monkeypatch):
+    """Without NUMBA_CACHE_DIR: the package's __pycache__, then the user's folder, whose name may be missing."""
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    assert machine_code.folders() == [PACKAGE / "__pycache__", tmp_path / "numba"]
+    monkeypatch.delenv("XDG_CACHE_HOME")
+    monkeypatch.setattr(os.path, "expanduser", lambda path: path)
+    assert machine_code.folders() == [PACKAGE / "__pycache__"]
+
+
+@pytest.mark.slow
+def test_compiled_here_it_is_the_same(fresh):
+    """What numba compiles for this processor moves the wheel as what ships does; again from the cache, at once."""
+    shutil.rmtree(fresh / "rftsim" / "shipped")
+    here = first_force(fresh)
+    kept = sorted(path.name for path in (fresh / "rftsim" / "__pycache__").glob("*.o.xz"))
+    assert len(kept) == len(PARTS)
+    again = first_force(fresh)
+    assert "numba" not in again["heavy"]
+    assert again["seconds"] < 3.0
+    assert again["numbers"] == here["numbers"]
+    np.testing.assert_allclose(here["numbers"], first_force(PACKAGE.parent)["numbers"], rtol=1e-9, atol=1e-12)
