@@ -19,6 +19,8 @@ import llvmlite
 import llvmlite.binding as llvm
 
 from rftsim.compiled import SOURCE
+from rftsim.errors import RftsimError
+from rftsim.files import replacing
 
 SHIPPED: Final = Path(__file__).parent / "shipped"
 SHIPPED_FOR: Final = "x86-64-v3"
@@ -129,9 +131,8 @@ def write(path: Path, key: bytes, code: bytes) -> bool:
     """Write an object file, whole or not at all; whether it could be written."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        temporary = path.with_name(f"{path.name}.{os.getpid()}")
-        temporary.write_bytes(key + lzma.compress(code))
-        temporary.replace(path)
-    except OSError:
+        with replacing(path) as temporary:
+            temporary.write_bytes(key + lzma.compress(code))
+    except (OSError, RftsimError):
         return False
     return True
