@@ -220,7 +220,7 @@ def _distinct(rows: Faces) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     first, same = np.zeros(1, dtype=int), np.zeros(len(rows), dtype=int)
     for column in rows.T:
         value = np.unique(column, return_inverse=True)[1]
-        _, first, same = np.unique(same * (value.max() + 1) + value, return_index=True, return_inverse=True)
+        _, first, same = np.unique(same * (value.max(initial=0) + 1) + value, return_index=True, return_inverse=True)
     return first, same
 
 
