@@ -7,6 +7,7 @@ from typing import Final
 FILES: Final = tuple(
     Path(__file__).parent / name
     for name in (
+        "choice.py",
         "claims.py",
         "dense.py",
         *(f"engine/{name}.py" for name in ("block", "bodies", "callbacks", "explicit", "external", "implicit")),

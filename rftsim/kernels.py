@@ -14,10 +14,8 @@ import numpy as np
 from numba import njit
 
 from rftsim import tables
+from rftsim.choice import FASTMATH, LOOK, ROOM, choosing, columns_on_stack, filled_up
 from rftsim.packed import BLOCK
-
-FASTMATH = {"reassoc", "contract", "arcp", "nsz"}
-"""Floating-point liberties of the compiled loops."""
 
 TINY = 1e-300
 STEP = 1e300
@@ -220,27 +218,70 @@ def deepest(cx, cy, cz, first, last, frame):
     return found
 
 
-def _sums(stress: Any) -> Any:
-    @njit(fastmath=FASTMATH, error_model="numpy", forceinline=True)
-    def sums(cx, cy, cz, nx, ny, nz, area, first, last, frame, medium):
-        """Force [N] and moment [N m] about the body's origin on triangles first to last, as six numbers."""
+@njit(forceinline=True)
+def _leads_3d(nx, ny, nz, vx, vy, vz, frame, reach2):
+    """Negative where a triangle lies behind the leading edge of the 3D laws: n.v_hat < -reach."""
+    vn = nx * vx + ny * vy + nz * vz
+    return vn * abs(vn) + reach2 * (vx * vx + vy * vy + vz * vz)
+
+
+@njit(forceinline=True)
+def _leads_2d(nx, ny, nz, vx, vy, vz, frame, reach2):
+    """The same of the 2D laws, of the parts of n and v in the plane of motion; there reach is no less than asked."""
+    ux, uy, uz = frame.up
+    ex, ey, ez = frame.forward
+    px, py, pz = uy * ez - uz * ey, uz * ex - ux * ez, ux * ey - uy * ex
+    across = (nx * px + ny * py + nz * pz) * (vx * px + vy * py + vz * pz)
+    vn = nx * vx + ny * vy + nz * vz - across
+    return vn * abs(vn) + reach2 * (vx * vx + vy * vy + vz * vz)
+
+
+def _choosing(leads: Any, later: bool) -> Any:
+    """The function that chooses what leads in the sand; later: or in that after a time h."""
+
+    @njit(forceinline=True)
+    def score(x, y, z, nx, ny, nz, frame, reach2, h):
         v0x, v0y, v0z = frame.v0
         wx, wy, wz = frame.omega
-        fx = fy = fz = tx = ty = tz = 0.0
-        for i in range(first, last):
-            x, y, z = cx[i], cy[i], cz[i]
+        vx, vy, vz = v0x + wy * z - wz * y, v0y + wz * x - wx * z, v0z + wx * y - wy * x
+        depth = _depth(x, y, z, frame)
+        if later:
+            ux, uy, uz = frame.rise
+            depth = larger(depth, depth - h * (vx * ux + vy * uy + vz * uz))
+        return smaller(depth, leads(nx, ny, nz, vx, vy, vz, frame, reach2))
+
+    return choosing(score)
+
+
+@njit(forceinline=True)
+def _reach2(medium):
+    """Square of how far behind the leading edge triangles count, n.v_hat; with room for rounding."""
+    reach = medium.edge_on + 1.0 / medium.ramp
+    return 1.01 * reach * reach
+
+
+def _sums(stress: Any, leads: Any) -> Any:
+    choose = _choosing(leads, later=False)
+
+    @njit(fastmath=FASTMATH, error_model="numpy", forceinline=True)
+    def add(chosen, n, frame, medium, total):
+        v0x, v0y, v0z = frame.v0
+        wx, wy, wz = frame.omega
+        fx, fy, fz, tx, ty, tz = total
+        for i in range(n):
+            x, y, z = chosen[i], chosen[i + ROOM], chosen[i + 2 * ROOM]
             sx, sy, sz, inertia, mx, my, mz = stress(
-                nx[i],
-                ny[i],
-                nz[i],
+                chosen[i + 3 * ROOM],
+                chosen[i + 4 * ROOM],
+                chosen[i + 5 * ROOM],
                 v0x + wy * z - wz * y,
                 v0y + wz * x - wx * z,
                 v0z + wx * y - wy * x,
                 frame,
                 medium,
             )
-            depth = _depth(x, y, z, frame)
-            weight, sunk = area[i] * larger(depth, 0.0), area[i] * inertia if depth > 0.0 else 0.0
+            depth, area = _depth(x, y, z, frame), chosen[i + 6 * ROOM]
+            weight, sunk = area * larger(depth, 0.0), area * inertia if depth > 0.0 else 0.0
             gx, gy, gz = weight * sx + sunk * mx, weight * sy + sunk * my, weight * sz + sunk * mz
             fx += gx
             fy += gy
@@ -249,6 +290,17 @@ def _sums(stress: Any) -> Any:
             ty += z * gx - x * gz
             tz += x * gy - y * gx
         return fx, fy, fz, tx, ty, tz
+
+    @njit(fastmath=FASTMATH, error_model="numpy", forceinline=True)
+    def sums(cx, cy, cz, nx, ny, nz, area, first, last, frame, medium):
+        """Force [N] and moment [N m] about the body's origin on triangles first to last, as six numbers."""
+        chosen, n, reach2, total = columns_on_stack(), 0, _reach2(medium), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        for start in range(first, last, LOOK):
+            end = min(start + LOOK, last)
+            n = choose((cx, cy, cz, nx, ny, nz, area), start, end, frame, reach2, 0.0, chosen, n)
+            if n > ROOM - LOOK or end == last:
+                total, n = add(chosen, filled_up(chosen, n), frame, medium, total), 0
+        return total
 
     return sums
 
@@ -276,7 +328,44 @@ def _tractions(stress: Any) -> Any:
     return tractions
 
 
-def _sums_ahead(stress: Any) -> Any:
+def _sums_ahead(stress: Any, leads: Any) -> Any:
+    choose = _choosing(leads, later=True)
+
+    @njit(fastmath=FASTMATH, error_model="numpy", forceinline=True)
+    def add(chosen, n, frame, medium, v_c, h, total):
+        v0x, v0y, v0z = frame.v0
+        wx, wy, wz = frame.omega
+        ux, uy, uz = frame.rise
+        fx, fy, fz, tx, ty, tz, fx1, fy1, fz1, tx1, ty1, tz1 = total
+        for i in range(n):
+            x, y, z = chosen[i], chosen[i + ROOM], chosen[i + 2 * ROOM]
+            nx, ny, nz, area = chosen[i + 3 * ROOM], chosen[i + 4 * ROOM], chosen[i + 5 * ROOM], chosen[i + 6 * ROOM]
+            vx = v0x + wy * z - wz * y
+            vy = v0y + wz * x - wx * z
+            vz = v0z + wx * y - wy * x
+            speed2 = vx * vx + vy * vy + vz * vz
+            slow = np.sqrt(speed2 / (speed2 + v_c * v_c + TINY))
+            sx, sy, sz, inertia, mx, my, mz = stress(nx, ny, nz, vx, vy, vz, frame, medium)
+            depth = _depth(x, y, z, frame)
+            later = depth - h * (vx * ux + vy * uy + vz * uz)
+            weight, sunk = slow * area * larger(depth, 0.0), area * inertia if depth > 0.0 else 0.0
+            gx, gy, gz = weight * sx + sunk * mx, weight * sy + sunk * my, weight * sz + sunk * mz
+            fx += gx
+            fy += gy
+            fz += gz
+            tx += y * gz - z * gy
+            ty += z * gx - x * gz
+            tz += x * gy - y * gx
+            weight, sunk = slow * area * larger(later, 0.0), area * inertia if later > 0.0 else 0.0
+            gx, gy, gz = weight * sx + sunk * mx, weight * sy + sunk * my, weight * sz + sunk * mz
+            fx1 += gx
+            fy1 += gy
+            fz1 += gz
+            tx1 += y * gz - z * gy
+            ty1 += z * gx - x * gz
+            tz1 += x * gy - y * gx
+        return fx, fy, fz, tx, ty, tz, fx1, fy1, fz1, tx1, ty1, tz1
+
     @njit(fastmath=FASTMATH, error_model="numpy", forceinline=True)
     def sums_ahead(cx, cy, cz, nx, ny, nz, area, first, last, frame, medium, v_c, h):
         """The sums of a law made continuous at rest, now and at the depths after a time h of this motion.
@@ -287,38 +376,14 @@ def _sums_ahead(stress: Any) -> Any:
         Returns:
             Force and moment at the present depths, and force and moment at the later ones.
         """
-        v0x, v0y, v0z = frame.v0
-        wx, wy, wz = frame.omega
-        ux, uy, uz = frame.rise
-        fx = fy = fz = tx = ty = tz = 0.0
-        fx1 = fy1 = fz1 = tx1 = ty1 = tz1 = 0.0
-        for i in range(first, last):
-            x, y, z = cx[i], cy[i], cz[i]
-            vx = v0x + wy * z - wz * y
-            vy = v0y + wz * x - wx * z
-            vz = v0z + wx * y - wy * x
-            speed2 = vx * vx + vy * vy + vz * vz
-            slow = np.sqrt(speed2 / (speed2 + v_c * v_c + TINY))
-            sx, sy, sz, inertia, mx, my, mz = stress(nx[i], ny[i], nz[i], vx, vy, vz, frame, medium)
-            depth = _depth(x, y, z, frame)
-            later = depth - h * (vx * ux + vy * uy + vz * uz)
-            weight, sunk = slow * area[i] * larger(depth, 0.0), area[i] * inertia if depth > 0.0 else 0.0
-            gx, gy, gz = weight * sx + sunk * mx, weight * sy + sunk * my, weight * sz + sunk * mz
-            fx += gx
-            fy += gy
-            fz += gz
-            tx += y * gz - z * gy
-            ty += z * gx - x * gz
-            tz += x * gy - y * gx
-            weight, sunk = slow * area[i] * larger(later, 0.0), area[i] * inertia if later > 0.0 else 0.0
-            gx, gy, gz = weight * sx + sunk * mx, weight * sy + sunk * my, weight * sz + sunk * mz
-            fx1 += gx
-            fy1 += gy
-            fz1 += gz
-            tx1 += y * gz - z * gy
-            ty1 += z * gx - x * gz
-            tz1 += x * gy - y * gx
-        return fx, fy, fz, tx, ty, tz, fx1, fy1, fz1, tx1, ty1, tz1
+        chosen, n, reach2 = columns_on_stack(), 0, _reach2(medium)
+        total = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        for start in range(first, last, LOOK):
+            end = min(start + LOOK, last)
+            n = choose((cx, cy, cz, nx, ny, nz, area), start, end, frame, reach2, h, chosen, n)
+            if n > ROOM - LOOK or end == last:
+                total, n = add(chosen, filled_up(chosen, n), frame, medium, v_c, h, total), 0
+        return total
 
     return sums_ahead
 
@@ -436,10 +501,10 @@ def _add_rows(k, row, out):
 
 _stress_3d_cubic, _stress_3d_quartic = _stress_3d(cubic), _stress_3d(quartic)
 
-sums_2d, tractions_2d = _sums(_stress_2d), _tractions(_stress_2d)
-sums_3d, tractions_3d = _sums(_stress_3d_cubic), _tractions(_stress_3d_cubic)
-sums_3d_quartic, tractions_3d_quartic = _sums(_stress_3d_quartic), _tractions(_stress_3d_quartic)
+sums_2d, tractions_2d = _sums(_stress_2d, _leads_2d), _tractions(_stress_2d)
+sums_3d, tractions_3d = _sums(_stress_3d_cubic, _leads_3d), _tractions(_stress_3d_cubic)
+sums_3d_quartic, tractions_3d_quartic = _sums(_stress_3d_quartic, _leads_3d), _tractions(_stress_3d_quartic)
 
-ahead_2d, jacobian_2d = _sums_ahead(_stress_2d), _jacobians(_stress_2d)
-ahead_3d, jacobian_3d = _sums_ahead(_stress_3d_cubic), _jacobians(_stress_3d_cubic)
-ahead_3d_quartic, jacobian_3d_quartic = _sums_ahead(_stress_3d_quartic), _jacobians(_stress_3d_quartic)
+ahead_2d, jacobian_2d = _sums_ahead(_stress_2d, _leads_2d), _jacobians(_stress_2d)
+ahead_3d, jacobian_3d = _sums_ahead(_stress_3d_cubic, _leads_3d), _jacobians(_stress_3d_cubic)
+ahead_3d_quartic, jacobian_3d_quartic = _sums_ahead(_stress_3d_quartic, _leads_3d), _jacobians(_stress_3d_quartic)

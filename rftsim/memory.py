@@ -88,3 +88,33 @@ def room(typing_context: Any, size: Any) -> Any:
 take = types.ExternalFunction("PyMem_RawMalloc", types.intp(types.uintp))
 allocate = types.ExternalFunction("PyMem_RawCalloc", types.intp(types.uintp, types.uintp))
 release = types.ExternalFunction("PyMem_RawFree", types.void(types.intp))
+
+
+def on_stack(size: int, element: Any) -> Any:
+    """What gives compiled code `size` numbers on its function's stack; the optimiser can tell them from all others."""
+
+    @intrinsic
+    def reserve(typing_context: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            place = alloca_once(builder, ir.ArrayType(context.get_value_type(element), size))
+            place.align = 64
+            return builder.bitcast(place, context.get_value_type(signature.return_type))
+
+        return types.CPointer(element)(), generate
+
+    return reserve
+
+
+def tuples(size: int, element: Any) -> Any:
+    """What reads `size` numbers at an address into a tuple; numba's own way there keeps a tuple in memory."""
+
+    @intrinsic
+    def read(typing_context: Any, address: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            first = builder.inttoptr(arguments[0], context.get_value_type(element).as_pointer())
+            places = (builder.gep(first, [ir.Constant(ir.IntType(64), k)]) for k in range(size))
+            return context.make_tuple(builder, signature.return_type, [builder.load(place) for place in places])
+
+        return types.UniTuple(element, size)(types.intp), generate
+
+    return read

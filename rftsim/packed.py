@@ -33,9 +33,11 @@ distance from the origin.
 """
 COLUMNS: Final = 7
 """Numbers per triangle, each a column: centre (3), normal (3), area."""
-BLOCK: Final = 64
-"""Triangles that are passed over together where their bounding sphere lies above the sand; the spheres (centre, radius)
-stand behind the columns."""
+BLOCK: Final = 32
+"""Triangles that are passed over together where the box of their centroids lies above the sand; the boxes stand behind
+the columns."""
+BOX: Final = 6
+"""Numbers of a box: centre and half its size, in the body frame."""
 
 
 def pack_sand(sand: Sand, law: Law, free_surface: FreeSurface, plane: ArrayLike) -> Array:
@@ -69,21 +71,20 @@ def pack_surface(surface: Surface) -> Array:
         header[7:10], header[10:13], header[13] = surface.wheel.axis, surface.wheel.centre, surface.wheel.radius
     header[14] = surface.ntri
     header[15] = np.sqrt((surface.centres**2).sum(axis=1).mean())
-    return np.concatenate([header, *surface.centres.T, *surface.normals.T, surface.areas, _spheres(surface).ravel()])
+    return np.concatenate([header, *surface.centres.T, *surface.normals.T, surface.areas, _boxes(surface).ravel()])
 
 
-def _spheres(surface: Surface) -> Array:
-    """Bounding spheres of the centroids of each BLOCK of triangles, (nblock, 4)."""
+def _boxes(surface: Surface) -> Array:
+    """Boxes of the centroids of each BLOCK of triangles, (nblock, BOX)."""
     blocks = [surface.centres[start : start + BLOCK] for start in range(0, surface.ntri, BLOCK)]
-    centres = np.array([(block.min(axis=0) + block.max(axis=0)) / 2 for block in blocks])
-    radii = [np.linalg.norm(block - centre, axis=1).max() for block, centre in zip(blocks, centres, strict=True)]
-    return np.column_stack([centres, radii])
+    low, high = (np.array([end(block, axis=0) for block in blocks]) for end in (np.min, np.max))
+    return np.hstack([low + high, high - low]) / 2
 
 
 def size_of(header: Array) -> int:
     """Numbers of the packed surface that starts with a header."""
     n = int(header[14])
-    return HEADER + COLUMNS * n + 4 * ((n + BLOCK - 1) // BLOCK)
+    return HEADER + COLUMNS * n + BOX * ((n + BLOCK - 1) // BLOCK)
 
 
 def read_columns(body: Array) -> tuple[Array, ...]:

@@ -174,9 +174,8 @@ def _prepare(p, h):
 
 @njit
 def _force_of(p, velocity, out):
-    """Fill out with the sand's force that makes MuJoCo's step end at a velocity."""
+    """Fill out with the sand's force that makes MuJoCo's step end at a velocity; the equation is that of the step."""
     v, h = equation.of_dofs(p, AT.velocity), _timestep(p)
-    _prepare(p, h)
     dense.copy(v, equation.of_dofs(p, AT.start))
     residual, nothing = equation.step_vector(p, KEEP.four), equation.step_vector(p, KEEP.five)
     for k in range(v.size):
@@ -312,6 +311,8 @@ def _one_step(p, most_parts):
     _finish(p, foreseen, equation.point_vector(p, at, PART.velocity), end, end, 0.0)
     for b in range(nb):
         dense.copy(equation.point_wrench(p, at, b, 0), doubles(equation.number(p, AT.wrench) + 48 * b, 6))
+    if drift != h:
+        _prepare(p, h)
     _force_of(p, end, equation.of_dofs(p, AT.out))
 
 
@@ -413,6 +414,7 @@ def _split_step(p, parts):
     _reset(p)
     has_contacts = _leave_to_mujoco(p, touched)
     dense.copy(mean, answer)
+    _prepare(p, h)
     _force_of(p, answer, q)
     if has_contacts:
         _answer(p, q, answer)

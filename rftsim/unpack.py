@@ -1,12 +1,13 @@
 """Sand and surface from their packed form, for compiled code."""
 
 import numpy as np
-from numba import njit
-from numba.np.unsafe.ndarray import to_fixed_tuple
+from numba import carray, njit, types
 
 from rftsim import kernels, packed
+from rftsim.choice import FASTMATH
 from rftsim.kernels import Frame, Medium
-from rftsim.packed import BLOCK, COLUMNS, HEADER, SAND_FIELDS, TERMS
+from rftsim.memory import on_stack, tuples
+from rftsim.packed import BLOCK, BOX, COLUMNS, HEADER, SAND_FIELDS, TERMS
 
 size_of = njit(forceinline=True)(packed.size_of)
 
@@ -30,9 +31,10 @@ def columns(body):
 @njit(forceinline=True)
 def block_is_clear(body, block, frame, margin):
     """Whether a block of triangles lies more than a margin above the undisturbed sand."""
-    start = HEADER + COLUMNS * int(body[14]) + 4 * block
-    height = frame.rise[0] * body[start] + frame.rise[1] * body[start + 1] + frame.rise[2] * body[start + 2]
-    return height - body[start + 3] >= frame.height + margin
+    start, r = HEADER + COLUMNS * int(body[14]) + BOX * block, frame.rise
+    middle = r[0] * body[start] + r[1] * body[start + 1] + r[2] * body[start + 2]
+    below = abs(r[0]) * body[start + 3] + abs(r[1]) * body[start + 4] + abs(r[2]) * body[start + 5]
+    return middle - below >= frame.height + margin
 
 
 @njit(forceinline=True)
@@ -87,17 +89,16 @@ def is_clear(sand, body, xpos, xmat):
     return lowest >= 0.0
 
 
+_terms = tuples(TERMS, types.float64)
+
+
 @njit(forceinline=True)
 def medium_of(sand, body):
     """The medium of a packed sand as its law sees it."""
     xi = sand[11] if sand[1] != 0.0 else sand[10]
     lambda_rho = sand[14] * sand[13] if sand[2] != 0.0 else 0.0
-    first = len(SAND_FIELDS)
-    table = (
-        to_fixed_tuple(sand[first : first + TERMS], TERMS),
-        to_fixed_tuple(sand[first + TERMS : first + 2 * TERMS], TERMS),
-        to_fixed_tuple(sand[first + 2 * TERMS :], TERMS),
-    )
+    first = sand.ctypes.data + 8 * len(SAND_FIELDS)
+    table = _terms(first), _terms(first + 8 * TERMS), _terms(first + 16 * TERMS)
     return Medium(xi, sand[12], lambda_rho, body[0], kernels.STEP, table)
 
 
@@ -114,6 +115,10 @@ def frame_of(sand, body, xpos, xmat, velocity, omega):
         return frame
     rear, drop = _structural(sand, body, frame, plane)
     return Frame(v0, w, up, up, frame.forward, height, rear, drop)
+
+
+_angles = on_stack(BLOCK, types.float64)
+_NO_RIM = 9.0
 
 
 @njit(forceinline=True)
@@ -139,26 +144,16 @@ def _structural(sand, body, frame, plane):
         (along * axis[1] - frame.up[1]) / level,
         (along * axis[2] - frame.up[2]) / level,
     )
-    first, last, clear = 3.0, -3.0, False
-    cx, cy, cz, nx, ny, nz, area = columns(body)
-    planar = sand[1]
-    for i in range(area.size):
-        if i % BLOCK == 0:
-            clear = block_is_clear(body, i // BLOCK, frame, 0.0)
-        if clear:
+    first, last, angles = 3.0, -3.0, carray(_angles(), (BLOCK,))
+    count = int(body[14])
+    for start in range(0, count, BLOCK):
+        if block_is_clear(body, start // BLOCK, frame, 0.0):
             continue
-        x, y, z = cx[i], cy[i], cz[i]
-        depth = frame.height - (frame.up[0] * x + frame.up[1] * y + frame.up[2] * z)
-        if depth <= 0.0 or abs(nx[i] * axis[0] + ny[i] * axis[1] + nz[i] * axis[2]) > 0.7:
-            continue
-        wv = _cross(frame.omega, (x, y, z))
-        v = frame.v0[0] + wv[0], frame.v0[1] + wv[1], frame.v0[2] + wv[2]
-        n = nx[i], ny[i], nz[i]
-        if _dot(n, v) - planar * _dot(n, plane) * _dot(v, plane) <= 0.0:
-            continue
-        p = x - centre[0], y - centre[1], z - centre[2]
-        angle = _diamond(_dot(p, ahead), _dot(p, down))
-        first, last = min(first, angle), max(last, angle)
+        end = min(start + BLOCK, count)
+        _rim_angles(columns(body), start, end, frame, axis, centre, ahead, down, plane, sand[1], angles)
+        for i in range(end - start):
+            first = kernels.smaller(angles[i], first)
+            last = kernels.larger(angles[i] if angles[i] < _NO_RIM else last, last)
     if last < first:
         return nothing
     middle = 0.5 * (_angle(first) + _angle(last))
@@ -173,13 +168,28 @@ def _structural(sand, body, frame, plane):
     return (onward[0], onward[1], onward[2], offset), radius * radius * spin * spin / sand[15]
 
 
-@njit(forceinline=True)
+@njit(fastmath=FASTMATH, error_model="numpy", forceinline=True)
+def _rim_angles(body_columns, start, end, frame, axis, centre, ahead, down, plane, planar, out):
+    """Fill out with the `_diamond` of each triangle that is rim, submerged and leading; or _NO_RIM."""
+    cx, cy, cz, nx, ny, nz, _ = body_columns
+    for i in range(start, end):
+        x, y, z = cx[i], cy[i], cz[i]
+        n, p = (nx[i], ny[i], nz[i]), (x - centre[0], y - centre[1], z - centre[2])
+        wv = _cross(frame.omega, (x, y, z))
+        v = frame.v0[0] + wv[0], frame.v0[1] + wv[1], frame.v0[2] + wv[2]
+        depth = frame.height - _dot(frame.up, (x, y, z))
+        leading = _dot(n, v) - planar * _dot(n, plane) * _dot(v, plane)
+        counts = (depth > 0.0) & (leading > 0.0) & (abs(_dot(n, axis)) <= 0.7)
+        angle = _diamond(_dot(p, ahead), _dot(p, down))
+        out[i - start] = angle if counts else _NO_RIM
+
+
+@njit(error_model="numpy", forceinline=True)
 def _diamond(s, c):
     """A number that grows with the angle atan2(s, c), in (-2, 2]; no trigonometry."""
     t = s / (abs(s) + abs(c) + kernels.TINY)
-    if c >= 0.0:
-        return t
-    return 2.0 - t if s >= 0.0 else -2.0 - t
+    side = 2.0 if s >= 0.0 else -2.0
+    return t if c >= 0.0 else side - t
 
 
 @njit(forceinline=True)

@@ -16,7 +16,7 @@ _RK4: Final = CONSTANTS["rk4"]
 _PASSIVE: Final = CONSTANTS["passive"]
 
 
-@njit
+@njit(forceinline=True)
 def _sense(model, data, m, d, number):
     """Copy each body's wrench to the sensors that name it."""
     address = instance.block_of(model, data, m, d, number)

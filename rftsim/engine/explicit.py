@@ -7,7 +7,7 @@ from rftsim.engine import block, bodies, instance
 from rftsim.memory import doubles, pointer, room
 
 
-@njit
+@njit(forceinline=True)
 def press(model, data, m, d, number):
     """Evaluate the sand on every body of the instance and add it to qfrc_passive."""
     address = instance.block_of(model, data, m, d, number)

@@ -30,7 +30,7 @@ _KIND: Final = {
 _KINDS: Final = tuple(_KIND[name] for name in sorted(_KIND, key=CONSTANTS.__getitem__))
 
 
-@njit
+@njit(forceinline=True)
 def _fill_mass(model, data, m, d, p):
     """The mass matrix, from its lower triangle in rows."""
     out = equation.square(p, AT.plain_mass)
@@ -49,7 +49,7 @@ def _fill_mass(model, data, m, d, p):
             out[column[k], i] = value[k]
 
 
-@njit
+@njit(forceinline=True)
 def _fill_drag(model, data, m, d, p):
     """What the integrator takes implicitly, over the time step; whether there is any."""
     out = equation.square(p, AT.drag)
@@ -82,7 +82,7 @@ def _fill_drag(model, data, m, d, p):
     return True
 
 
-@njit
+@njit(forceinline=True)
 def _fill_force(model, data, m, d, t, p):
     """All smooth forces of this step but the sand's."""
     bias = pointer(d + data.qfrc_bias)
@@ -105,7 +105,7 @@ def _fill_force(model, data, m, d, t, p):
             bodies.add_wrench(t, body, x, (f[0], f[1], f[2]), (f[3], f[4], f[5]), out)
 
 
-@njit
+@njit(forceinline=True)
 def _fill_rows(model, data, contact, m, d, p, dragged):
     """MuJoCo's constraint rows."""
     n, nv = equation.number(p, AT.nrow), equation.number(p, AT.nv)
@@ -165,7 +165,7 @@ def _fill_rows(model, data, contact, m, d, p, dragged):
         dense.add_transposed(drag, solved, 1.0, seen[i])
 
 
-@njit
+@njit(forceinline=True)
 def _fill_bodies(model, m, t, table, p):
     """The bodies of the instance."""
     n, v, w = table[0], doubles(room(3), 3), doubles(room(3), 3)
@@ -189,7 +189,7 @@ def _fill_bodies(model, m, t, table, p):
         native_ahead.frame(sand, surfaces[k], x, r.ctypes.data, v.ctypes.data, w.ctypes.data, f.ctypes.data)
 
 
-@njit
+@njit(forceinline=True)
 def press(model, data, contact, m, d, number):
     """Solve for the sand's force at the end of the step and add it to qfrc_passive."""
     address = instance.block_of(model, data, m, d, number)

@@ -79,7 +79,7 @@ def _slot(data, d, instance):
     return int64s(pointer(d + data.plugin_data) + SIZE * instance, 1)
 
 
-@njit
+@njit(forceinline=True)
 def block_of(model, data, m, d, instance):
     """The address of an instance's block; made anew where mjData lost it, as it does when it is pickled."""
     slot = _slot(data, d, instance)
@@ -187,7 +187,7 @@ def forget(address):
             values[i] = 0.0
 
 
-@njit
+@njit(forceinline=True)
 def keep(model, data, m, d, instance):
     """End a step: what it left pending lasts, and its work is counted."""
     address = block_of(model, data, m, d, instance)

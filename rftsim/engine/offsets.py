@@ -2,31 +2,31 @@
 
 from typing import Final
 
-from numba import njit
-from numba.np.unsafe.ndarray import to_fixed_tuple
+from numba import njit, types
 
 from rftsim.engine.layout import SYMBOL, Contact, Data, Model
-from rftsim.memory import int64s, named_address
+from rftsim.memory import named_address, tuples
 
 _MODEL: Final = len(Model._fields)
 _DATA: Final = len(Data._fields)
 _CONTACT: Final = len(Contact._fields)
 _place = named_address(SYMBOL)
+_read_model, _read_data, _read_contact = (tuples(size, types.int64) for size in (_MODEL, _DATA, _CONTACT))
 
 
 @njit(forceinline=True)
 def model():
     """Offsets in mjModel."""
-    return Model(*to_fixed_tuple(int64s(_place(), _MODEL), _MODEL))
+    return Model(*_read_model(_place()))
 
 
 @njit(forceinline=True)
 def data():
     """Offsets in mjData."""
-    return Data(*to_fixed_tuple(int64s(_place() + 8 * _MODEL, _DATA), _DATA))
+    return Data(*_read_data(_place() + 8 * _MODEL))
 
 
 @njit(forceinline=True)
 def contact():
     """Offsets in mjContact."""
-    return Contact(*to_fixed_tuple(int64s(_place() + 8 * (_MODEL + _DATA), _CONTACT), _CONTACT))
+    return Contact(*_read_contact(_place() + 8 * (_MODEL + _DATA)))

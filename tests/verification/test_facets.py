@@ -104,7 +104,7 @@ def test_tolerance_is_kept():
 
 
 def test_a_block_is_left_alone():
-    """Up to 64 triangles are one block, so none is put together."""
+    """What is one block of triangles stays so: none is put together."""
     mesh = trimesh.creation.box((0.3, 0.2, 0.1))
     surface = make_surface(mesh.vertices, mesh.faces)
     facets, found = reduced(surface, BED, 0.01)
