@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
-from typing import Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
@@ -20,12 +20,17 @@ from rftsim.packed import BLOCK, COLUMNS, pack_sand, pack_surface, read_columns
 from rftsim.sand import FreeSurface, Sand
 from rftsim.surface import Array, Surface
 
+if TYPE_CHECKING:
+    from rftsim.bench.single import Single
+
 SIZES: Final = (16, 64, 256, 1024, 4096, 20480, 81920, 327680, 1048576)
 """Triangles of the bodies."""
 LINEAR: Final = 1000
 """Sizes from here on count for the exponent."""
 SHORTEST: Final = 2e-3
 """Time that one measurement takes at least [s]."""
+SINGLE: Final = 20480
+"""Triangles on which single precision is measured."""
 LITERAL: Final = 100_000
 """Sizes up to here are timed in NumPy, too."""
 ROUNDS: Final = 30
@@ -48,6 +53,8 @@ class Cost(NamedTuple):
     """The same in the tests' NumPy; nan where it was not measured."""
     bytes: int
     """Of the packed body."""
+    leading: float
+    """Share of the triangles that lead; the law is evaluated on no others."""
 
     @property
     def nanoseconds(self) -> float:
@@ -88,19 +95,19 @@ def measure(sizes: tuple[int, ...], oracle: ModuleType | None, report: Callable[
 
     sand = pack_sand(SAND, get_law(LAW), FreeSurface(), (0.0, 1.0, 0.0))
     works: list[Callable[[int], Any]] = []
-    sizes_in_bytes = []
+    bodies = []
     for size in sizes:
         surface = _ball(size)
         body = pack_surface(surface)
-        sizes_in_bytes.append(body.nbytes)
+        bodies.append((body.nbytes, _leading(surface)))
         works.append(functools.partial(loops.evaluate, sand, body, *_motion(surface), np.empty(6)))
         if oracle is not None and size <= LITERAL:
             works.append(functools.partial(_literal, oracle, surface))
     seconds = iter(_least(works, report))
     costs = []
-    for size, bytes_ in zip(sizes, sizes_in_bytes, strict=True):
+    for size, told in zip(sizes, bodies, strict=True):
         costs.append(
-            Cost(size, next(seconds), next(seconds) if oracle is not None and size <= LITERAL else math.nan, bytes_)
+            Cost(size, next(seconds), next(seconds) if oracle is not None and size <= LITERAL else math.nan, *told)
         )
     return costs
 
@@ -117,6 +124,14 @@ def arithmetic() -> Arithmetic:
     numbers = np.linspace(0.0, 0.5, 512)
     (seconds,) = _least([functools.partial(loops.polynomials, numbers, np.empty(numbers.size))], lambda _: None)
     return Arithmetic(operations, 1e9 * operations * seconds / (numbers.size * _OPERATIONS))
+
+
+def single_precision() -> "Single":
+    """The law's loop in single precision, on a body of many triangles."""
+    from rftsim.bench import single  # which numba compiles
+
+    sand, surface = pack_sand(SAND, get_law(LAW), FreeSurface(), (0.0, 1.0, 0.0)), _ball(SINGLE)
+    return single.measure(sand, pack_surface(surface), _motion(surface), lambda works: _least(works, lambda _: None))
 
 
 def exponent(costs: list[Cost]) -> float:
@@ -155,6 +170,12 @@ def _motion(surface: Surface) -> tuple[Array, Array, Array, Array]:
     """A pose deep in the sand, velocity and angular velocity."""
     position = np.array([0.0, 0.0, -1.0]) - middle(surface)
     return position, np.eye(3).ravel(), np.array([0.3, 0.2, -1.0]), np.array([1.0, 2.0, 3.0])
+
+
+def _leading(surface: Surface) -> float:
+    _, _, velocity, omega = _motion(surface)
+    moving = velocity + np.cross(omega, surface.centres)
+    return float((np.einsum("ij,ij->i", surface.normals, moving) >= 0.0).mean())
 
 
 def _literal(oracle: Any, surface: Surface, count: int) -> None:

@@ -3,6 +3,7 @@
 import numba  # not `from`: what measures the package is not part of what its machine code is made from
 
 from rftsim import kernels, machine_code, native_law, unpack
+from rftsim.choice import FASTMATH
 
 machine_code.load("law")("rftsim_wrench")  # by which name compiled code finds it from here on
 
@@ -22,7 +23,7 @@ def evaluate(sand, body, position, turn, velocity, omega, out, count):
         )
 
 
-@numba.njit(fastmath=kernels.FASTMATH, error_model="numpy")
+@numba.njit(fastmath=FASTMATH, error_model="numpy")
 def sums(sand, body, cx, cy, cz, nx, ny, nz, area, position, turn, velocity, omega):
     """The law's loop alone, whose instructions are counted."""
     frame, medium = unpack.frame_of(sand, body, position, turn, velocity, omega), unpack.medium_of(sand, body)

@@ -15,6 +15,7 @@ from rich.table import Table
 from rftsim.bench import kernel
 from rftsim.bench.hard_cases import CASES, Force
 from rftsim.bench.stability import FORCES, STEPS, Row, Starts, Study, Summary, run, summarise
+from rftsim.cli import costs
 from rftsim.cli.output import print_json
 from rftsim.errors import RftsimError
 from rftsim.files import check_writable, replacing
@@ -28,26 +29,30 @@ class Bench:
     stability: the hard cases (rest, light legs, stiff servos, impacts, edges, constraints) at time steps from 0.1 to
     10 ms with the implicit and the explicit force, against the exact or converged answer.
 
+    environment: what sand adds to MuJoCo's step, in one simulation and in 256 side by side.
+
+    pareto: laws, triangles and time steps: what each costs, and how far it is from the finest.
+
     kernel: the time of a buried triangle by the size of the body, over that of the tests' NumPy, and the share of what
     the processor's arithmetic allows.
 
     Example: rftsim bench stability --plot out
     """
 
-    study: tyro.conf.Positional[Literal["stability", "kernel"]]
+    study: tyro.conf.Positional[Literal["stability", "kernel", "environment", "pareto"]]
     """What is measured."""
     cases: tuple[str, ...] = ()
     """Names of cases; by default all."""
     starts: int = 1000
     """Random starts of a free runner."""
     quick: bool = False
-    """Steps of 1 and 5 ms and 20 random starts only; bodies of up to 20,480 triangles."""
+    """Steps of 1 and 5 ms, 20 random starts; bodies of up to 20,480 triangles; fewer repetitions; one law each."""
     oracle: Path = Path("tests/oracle.py")
     """The tests' laws in NumPy, that kernel compares with where they are there."""
     plot: Path | None = None
-    """Folder for stability.png or kernel.png."""
+    """Folder for the study's picture, NAME.png."""
     memory: Path = Path("out/bench")
-    """Folder for what stability measured: if stopped, it goes on from there."""
+    """Folder for what stability and pareto measured: if stopped, they go on from there."""
     json: bool = False
     """Print JSON instead of the tables."""
 
@@ -55,6 +60,12 @@ class Bench:
         """Measure, print and draw."""
         if self.study == "kernel":
             self._kernel()
+            return
+        if self.study == "environment":
+            costs.environment(self.quick, self.plot, self.json)
+            return
+        if self.study == "pareto":
+            costs.pareto(self.quick, self.memory, self.plot, self.json)
             return
         unknown = sorted(set(self.cases) - set(CASES))
         if unknown:
@@ -90,8 +101,10 @@ class Bench:
             check_writable(picture)
         sizes = tuple(size for size in kernel.SIZES if not self.quick or size <= 20480)
         with Progress(console=Console(stderr=True), transient=True, disable=self.json) as bar:
-            task = bar.add_task("kernel", total=kernel.ROUNDS + 1)
+            task = bar.add_task("kernel", total=kernel.ROUNDS + 2)
             limit = kernel.arithmetic()
+            bar.advance(task)
+            single = kernel.single_precision()
             bar.advance(task)
             costs = kernel.measure(sizes, kernel.load_oracle(self.oracle), lambda _: bar.advance(task))
         power = kernel.exponent(costs)
@@ -100,16 +113,30 @@ class Bench:
                 plot_kernel(costs, limit, temporary)
         if self.json:
             rows = [
-                {"triangles": c.triangles, "ns": c.nanoseconds, "numpy_ratio": _number(c.ratio), "memory": c.memory}
+                {
+                    "triangles": c.triangles,
+                    "ns": c.nanoseconds,
+                    "numpy_ratio": _number(c.ratio),
+                    "memory": c.memory,
+                    "leading": c.leading,
+                }
                 for c in costs
             ]
-            print_json({"law": kernel.LAW, "sizes": rows, "exponent": power, "arithmetic": limit._asdict()})
+            found = {"law": kernel.LAW, "sizes": rows, "exponent": power}
+            print_json({**found, "arithmetic": limit._asdict(), "single_precision": single._asdict()})
             return
         console = Console()
         console.print(_kernel_table(costs, limit))
         console.print(
             f"time grows with the {power:.3f}th power of the triangles from {kernel.LINEAR} on; the law's "
-            f"{limit.operations:.0f} operations take {limit.nanoseconds:.2f} ns at least",
+            f"{limit.operations:.0f} operations take {limit.nanoseconds:.2f} ns at least, and are spared the "
+            f"{100 - 100 * costs[-1].leading:.0f} % of the triangles that do not lead",
+            highlight=False,
+            soft_wrap=True,
+        )
+        console.print(
+            f"in single precision the loop takes {single.single_nanoseconds:.2f} ns for each of {single.triangles} "
+            f"triangles instead of {single.double_nanoseconds:.2f}, and its wrench errs by {single.error:.1g}",
             highlight=False,
             soft_wrap=True,
         )

@@ -16,6 +16,8 @@ from mujoco import rollout
 from trees import BALL, SAND, sandy, spec_of, trajectory, tree
 
 from rftsim import add_sand, wrenches
+from rftsim.packed import SAND_FIELDS
+from rftsim.readout import instances
 
 NSTEP = 40
 
@@ -26,8 +28,7 @@ def model(request):
     return sandy(tree(np.random.default_rng(11), ["free", "hinge", "none"]), surface=0.1, force=request.param)
 
 
-@pytest.fixture(scope="module")
-def starts(model):
+def starts_of(model):
     """Eight states, (8, nstate)."""
     rng, data, spec = np.random.default_rng(0), mujoco.MjData(model), mujoco.mjtState.mjSTATE_FULLPHYSICS
     states = np.zeros((8, mujoco.mj_stateSize(model, spec)))
@@ -35,6 +36,12 @@ def starts(model):
         data.qvel[:] = rng.normal(size=model.nv)
         mujoco.mj_getState(model, data, state, spec)
     return states
+
+
+@pytest.fixture(scope="module")
+def starts(model):
+    """Of the model."""
+    return starts_of(model)
 
 
 @pytest.fixture(scope="module")
@@ -115,6 +122,37 @@ def test_batch_with_sand_of_its_own_in_each_simulation():
     assert sensors[0, 2] > 1.0
     np.testing.assert_allclose(sensors[1], 2.0 * sensors[0], rtol=1e-12)
     np.testing.assert_array_equal(sensors[2], sensors[0])
+
+
+@pytest.mark.parametrize("nthread", [1, 2])
+@pytest.mark.parametrize("force", ["explicit", "implicit"])
+def test_batch_with_random_sand(force, nthread):
+    """Strength, friction and density of its own in each simulation: bit-identical to single runs with that sand."""
+    bodies = tree(np.random.default_rng(11), ["free", "hinge", "none"])
+    model = sandy(bodies, surface=0.1, law="drft3d", force=force)
+    starts = starts_of(model)
+    batch = batch_of(model, starts, nthread)
+    sand = model.numeric("rftsim-sand:sand").adr[0] + np.arange(instances(model)[0].sand.size)
+    factors = np.ones((len(starts), sand.size))
+    drawn = [SAND_FIELDS.index(name) for name in ("xi_n", "zeta", "mu_surf", "rho_c")]
+    factors[:, drawn] = np.exp(np.random.default_rng(3).uniform(-0.7, 0.7, size=(len(starts), len(drawn))))
+    batch.expand("numeric_data")[:, sand] *= factors
+    sensors, state = batch.bind("sensordata"), {name: batch.bind(name) for name in ("qpos", "qvel")}
+    singles = []
+    for start, factor in zip(starts, factors, strict=True):
+        own = copy.copy(model)
+        own.numeric_data[sand] *= factor
+        data = mujoco.MjData(own)
+        mujoco.mj_setState(own, data, start, mujoco.mjtState.mjSTATE_FULLPHYSICS)
+        singles.append((own, data))
+    for _ in range(NSTEP):
+        batch.step()
+        for i, (own, data) in enumerate(singles):
+            mujoco.mj_step(own, data)
+            np.testing.assert_array_equal(sensors[i], data.sensordata)
+            for name, rows in state.items():
+                np.testing.assert_array_equal(rows[i], getattr(data, name))
+    assert len({tuple(row) for row in sensors}) == len(starts)
 
 
 def test_threads(model, starts, alone):

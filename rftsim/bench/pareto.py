@@ -1,0 +1,199 @@
+"""What speed costs in accuracy: laws, triangles and time steps, against the finest mesh at a small step.
+
+Each law is held against itself: its own wrench and trajectory with every triangle of a fine mesh, at a step of 0.1 ms.
+How far the laws are from one another is told beside that.
+"""
+
+import math
+import statistics
+import time
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any, Final, Literal, NamedTuple
+
+import mujoco
+import numpy as np
+
+from rftsim import economy
+from rftsim.bench import subjects
+from rftsim.bench.subjects import SUBJECTS, Subject
+from rftsim.compiled import SOURCE
+from rftsim.kept import Kept
+from rftsim.reach import sampled_reach
+from rftsim.readout import instances
+from rftsim.scenes import Staged
+from rftsim.surface import Array
+
+STEPS: Final = (5e-4, 1e-3, 2e-3, 5e-3, 1e-2)
+"""[s]."""
+REFERENCE_STEP: Final = 1e-4
+"""[s]."""
+SAMPLE: Final = 1e-2
+"""Between two positions that are compared [s]."""
+REPEATS: Final = 3
+"""Of all runs in turn; the median of a run's times counts."""
+LESS: Final = 0.7
+"""What counts as better has at most this share of the error."""
+SEED: Final = 7
+"""Of the poses and motions at which wrenches are compared; economies were sought at others."""
+Mesh = Literal["fine", "shipped", "1 %", "3 %", "10 %"]
+MESHES: Final[tuple[Mesh, ...]] = ("fine", "shipped", "1 %", "3 %", "10 %")
+"""Every triangle of the fine mesh; the model's own; the fewest facets found of the fine mesh within a tolerance."""
+Force = Literal["implicit", "explicit"]
+
+
+class Tried(NamedTuple):
+    """One way to step a subject."""
+
+    subject: str
+    law: str
+    mesh: Mesh
+    elements: int
+    """Triangles or facets, of all bodies."""
+    wrench_error: float
+    """Largest over poses and motions, see `economy.errors`."""
+    force: Force
+    h: float
+    """Time step [s]."""
+    error: float
+    """Largest distance from the reference's path, over that path's length; infinite where the simulation was lost."""
+    seconds: float
+    """Processor time of a step."""
+
+    @property
+    def cost(self) -> float:
+        """Processor time over simulated time."""
+        return self.seconds / self.h
+
+
+class Compared(NamedTuple):
+    """Everything of one subject under one law."""
+
+    tried: list[Tried]
+    path: Array
+    """The reference's positions [m], (n, 3)."""
+
+
+class Study:
+    """The study, remembered in a file, so that it can be stopped and taken up again.
+
+    Args:
+        path: The file; what was measured with these sources on this MuJoCo is not measured again.
+        quick: Each subject's own law, its own mesh and 10 %, at 1 and 5 ms.
+    """
+
+    def __init__(self, path: Path, quick: bool) -> None:
+        own = b"".join(Path(str(module.__file__)).read_bytes() for module in (subjects, economy))
+        self.kept = Kept(path, SOURCE + own + Path(__file__).read_bytes() + mujoco.__version__.encode())
+        self.quick = quick
+
+    def laws(self, name: str) -> tuple[str, ...]:
+        """Those of a subject."""
+        return SUBJECTS[name].laws[: 1 if self.quick else None]
+
+    def compared(self, name: str, law: str) -> Compared:
+        """A subject under a law, measured now or before."""
+        meshes: tuple[Mesh, ...] = ("shipped", "10 %") if self.quick else MESHES
+        steps = (1e-3, 5e-3) if self.quick else STEPS
+        key = f"{name}/{law}{'/quick' if self.quick else ''}"
+        tried, path = self.kept.get(key, lambda: _compare(name, law, meshes, steps))
+        return Compared([Tried(*one) for one in tried], np.array(path))
+
+
+def run(study: Study, names: Iterable[str], report: Callable[[str], Any]) -> list[Compared]:
+    """Every subject under every law; `report` is called with what was done."""
+    found = []
+    for name in names:
+        for law in study.laws(name):
+            found.append(study.compared(name, law))
+            report(f"{name}, {law}")
+    return found
+
+
+def fronts(tried: Iterable[Tried]) -> list[Tried]:
+    """Those that nothing cheaper comes near, see LESS; the cheapest first."""
+    best, front = math.inf, []
+    for one in sorted(tried, key=lambda one: (one.cost, one.error)):
+        if one.error < LESS * best:
+            best = one.error
+            front.append(one)
+    return front
+
+
+def apart(compared: list[Compared]) -> dict[tuple[str, str], float]:
+    """How far each law's path is from that of the subject's own law, over that one's length."""
+    own: dict[str, Array] = {}
+    found = {}
+    for each in compared:
+        first = each.tried[0]
+        path = own.setdefault(first.subject, each.path)
+        found[first.subject, first.law] = _distance(each.path, path)
+    return found
+
+
+def _compare(name: str, law: str, meshes: Iterable[Mesh], steps: Iterable[float]) -> tuple[list[Tried], Any]:
+    subject = SUBJECTS[name]
+    fine = _staged(subject, law, "fine", "implicit")
+    path, _ = _path(subject, fine, REFERENCE_STEP)
+    kinds: list[tuple[Mesh, Force]] = [(mesh, "implicit") for mesh in meshes]
+    scenes = {(mesh, force): _staged(subject, law, mesh, force) for mesh, force in [*kinds, ("shipped", "explicit")]}
+    paths: dict[tuple[Mesh, Force, float], list[tuple[Array, float]]] = {}
+    for _ in range(REPEATS):
+        for (mesh, force), staged in scenes.items():
+            for h in steps:
+                paths.setdefault((mesh, force, h), []).append(_path(subject, staged, h))
+    tried = []
+    for (mesh, force), staged in scenes.items():
+        elements = sum(surface.ntri for surface in staged.bed.surfaces.values())
+        wrong = _wrench_error(fine, staged)
+        for h in steps:
+            runs = paths[mesh, force, h]
+            seconds = statistics.median(seconds for _, seconds in runs)
+            tried.append(Tried(name, law, mesh, elements, wrong, force, h, _distance(runs[0][0], path), seconds))
+    return tried, path.tolist()
+
+
+def _staged(subject: Subject, law: str, mesh: Mesh, force: Force) -> Staged:
+    if mesh == "shipped":
+        return subject.staged(law, force=force)
+    if mesh == "fine":
+        return subject.staged(law, force=force, max_edge=subject.fine)
+    return subject.staged(law, force=force, max_edge=subject.fine, tolerance=float(mesh.removesuffix(" %")) / 100)
+
+
+def _path(subject: Subject, staged: Staged, h: float) -> tuple[Array, float]:
+    """Positions of the measured body from the start on, (n, 3), no numbers once it is lost; and the time of a step."""
+    model = staged.model
+    model.opt.timestep = h
+    data, body = subject.start(model), model.body(staged.measured.body).id
+    total, each = round(subject.duration / SAMPLE), round(SAMPLE / h)
+    path, spent = np.full((total + 1, 3), np.nan), 0.0
+    path[0] = data.xpos[body]
+    for k in range(total):
+        started = time.thread_time()
+        mujoco.mj_step(model, data, nstep=each)
+        spent += time.thread_time() - started
+        if any(warning.number for warning in data.warning):
+            break
+        mujoco.mj_kinematics(model, data)
+        path[k + 1] = data.xpos[body]
+    return path, spent / ((k + 1) * each)
+
+
+def _distance(path: Array, reference: Array) -> float:
+    """Largest distance between two paths at the same time, over the length of the reference."""
+    largest = np.linalg.norm(path - reference, axis=1).max()
+    length = np.linalg.norm(np.diff(reference, axis=0), axis=1).sum()
+    return float(largest / length) if np.isfinite(largest) else math.inf
+
+
+def _wrench_error(fine: Staged, staged: Staged) -> float:
+    """Largest error of any body's wrench."""
+    (bed,) = instances(fine.model)
+    found = []
+    for name, surface in fine.bed.surfaces.items():
+        reach = sampled_reach(fine.model, fine.model.body(name).id, surface, SEED)
+        samples = economy.draw(surface, bed.sand, reach, economy.DEPTHS, SEED)
+        whole, reduced = (economy.wrenches(s, bed.sand, samples) for s in (surface, staged.bed.surfaces[name]))
+        found.append(economy.errors(whole, reduced, samples.depth).max())
+    return float(max(found))

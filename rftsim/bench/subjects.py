@@ -1,0 +1,121 @@
+"""What the studies of cost step: the shipped wheel, runner and sphere, and a hexapod, all on loose poppy seeds."""
+
+import dataclasses
+import functools
+import math
+from collections.abc import Callable, Mapping
+from typing import Any, Final
+
+import mujoco
+import numpy as np
+from rftsim_models import parts
+from rftsim_models.hexapod import LEGS, TRIPODS, build_hexapod
+
+from rftsim.scene import add_sand
+from rftsim.scenes import POPPY, SCENES, Measured, Staged, stage
+
+GAIT: Final = 10.0
+"""Rate of the hexapod's legs [rad/s]."""
+SETTLING: Final = 1.0
+"""After this time a subject moves as it goes on to [s]."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Subject:
+    """A scene that is stepped.
+
+    Attributes:
+        says: What it is.
+        laws: That apply to it; the first is its own.
+        staged: Makes it with sand, from a law and the options of `stage`.
+        bare: Makes it without.
+        begin: Sets its start.
+        fine: Longest edge of its finest mesh [m].
+        duration: How long its trajectory is compared for [s].
+    """
+
+    says: str
+    laws: tuple[str, ...]
+    staged: Callable[..., Staged]
+    bare: Callable[[], mujoco.MjSpec]
+    begin: Callable[[mujoco.MjModel, mujoco.MjData], None]
+    fine: float
+    duration: float
+
+    def start(self, model: mujoco.MjModel) -> mujoco.MjData:
+        """Data at the start."""
+        data = mujoco.MjData(model)
+        self.begin(model, data)
+        mujoco.mj_forward(model, data)
+        return data
+
+
+def _shipped(name: str, laws: tuple[str, ...], fine: float, duration: float, **settings: str) -> Subject:
+    scene = SCENES[name]
+
+    def staged(law: str, **options: Any) -> Staged:
+        return stage(name, law=law, settings=settings, draw=False, **options)
+
+    return Subject(
+        scene.says, laws, staged, lambda: scene.build({**scene.settings, **settings}), _from_key, fine, duration
+    )
+
+
+def _from_key(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    if model.nkey:
+        mujoco.mj_resetDataKeyframe(model, data, 0)
+
+
+def _hexapod_without_sand() -> mujoco.MjSpec:
+    spec = build_hexapod()
+    spec.option.timestep = 5e-3
+    return spec
+
+
+def _hexapod(law: str, *, timestep: float | None = None, **options: Any) -> Staged:
+    spec = _hexapod_without_sand()
+    spec.option.timestep = timestep or spec.option.timestep
+    options.setdefault("max_edge", math.inf)
+    bed = add_sand(spec, POPPY, law, bodies=(parts.TORSO, *LEGS), draw=False, **options)
+    return Staged(spec.compile(), bed, Measured(parts.TORSO, None), SETTLING)
+
+
+def _on_a_tripod(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    _from_key(model, data)
+    data.qpos[7 + np.array(TRIPODS[0])] = np.pi
+    data.ctrl[:] = GAIT
+
+
+_EVERY: Final = ("drft2d", "rft2d", "drft3d", "rft3d")
+SUBJECTS: Final[Mapping[str, Subject]] = {
+    "wheel": _shipped("grouser-wheel", _EVERY, 0.06, 1.0),
+    "runner": _shipped("four-flap-runner", ("drft2d", "drft3d"), 0.25, 0.5),
+    "sphere": _shipped("intruder", ("rft3d", "drft3d"), 0.006, 0.3, height="0.06"),
+    "hexapod": Subject(
+        "[RHex] a hexapod of 2.3 kg on six C-legs, at 10 rad/s",
+        ("rft3d",),
+        _hexapod,
+        _hexapod_without_sand,
+        _on_a_tripod,
+        0.02,
+        0.3,
+    ),
+}
+"""Every subject by name."""
+
+
+@functools.cache
+def in_motion(name: str, law: str) -> mujoco.MjData:
+    """Data of a subject after SETTLING, with the implicit force."""
+    subject = SUBJECTS[name]
+    model = subject.staged(law).model
+    data = subject.start(model)
+    mujoco.mj_step(model, data, nstep=round(SETTLING / model.opt.timestep))
+    return data
+
+
+def put(data: mujoco.MjData, moving: mujoco.MjData) -> None:
+    """Set the motion of one data into another, of the same model with other sand or none, and forget all else."""
+    mujoco.mj_resetData(data.model, data)
+    for name in ("qpos", "qvel", "ctrl", "act", "qacc_warmstart"):
+        getattr(data, name)[:] = getattr(moving, name)
