@@ -17,8 +17,6 @@ RATES: Final = {"grouser-wheel": (10.0, 30.0, 60.0, 90.0), "four-flap-runner": (
 """Of the shipped wheels, by scene [1/min]."""
 DRAG: Final = (580.0, 1.1)
 """K [N/m^2] and lambda of [Agarwal] section 4.7."""
-PUSH_LAMBDA: Final = 2.8
-"""Of [Agarwal] Fig. B-3."""
 UNSTEADY: Final = 0.05
 """A change of the speed over the means' time that a reader is told of [-]."""
 
@@ -36,14 +34,9 @@ def _law(scene: str, rpm: float) -> dict[str, float]:
     return {"rolling": 1.0 - point.slip, "sinkage": point.sinkage}
 
 
-def _plates(results: Results) -> list[dict[str, Any]]:
-    table = []
-    for one in results:
-        plate = one["plate"]
-        dragged = plate["gamma"] == 0.0
-        kept = {name: plate[name] for name in ("rho", "length", "depth", "speed", "buried")}
-        table.append(kept | {"dragged": dragged, "force": -one["force"][0] if dragged else one["force"][1]})
-    return table
+def _plates(results: Results) -> list[dict[str, float]]:
+    kept = ("rho", "length", "depth", "speed", "buried")
+    return [{name: one["plate"][name] for name in kept} | {"force": -one["force"][0]} for one in results]
 
 
 def _wheels(results: Results) -> list[dict[str, Any]]:
@@ -70,26 +63,22 @@ def rows(measured: Measured) -> list[Row]:
     return [*_plate_rows(found(measured, "rates") or []), *_wheel_rows(measured, found(measured, "wheels") or [])]
 
 
-def _fit(plates: list[dict[str, Any]]) -> tuple[float, float]:
+def _fit(plates: list[dict[str, float]]) -> tuple[float, float]:
     """K and lambda of F = K z + lambda rho L v^2 by least squares."""
     basis = [[one["depth"], one["rho"] * one["length"] * one["speed"] ** 2] for one in plates]
     (stiffness, inertia), *_ = np.linalg.lstsq(np.array(basis), np.array([one["force"] for one in plates]), rcond=None)
     return float(stiffness), float(inertia)
 
 
-def _plate_rows(plates: list[dict[str, Any]]) -> list[Row]:
+def _plate_rows(plates: list[dict[str, float]]) -> list[Row]:
     table = []
-    dragged = [one for one in plates if one["dragged"]]
-    for travel in sorted({one["buried"] for one in dragged}):
-        stiffness, inertia = _fit([one for one in dragged if one["buried"] == travel])
-        what, source = f"continuum: drag after {travel:g} plate lengths", "[Agarwal] section 4.7"
+    for travel in sorted({one["buried"] for one in plates}):
+        stiffness, inertia = _fit([one for one in plates if one["buried"] == travel])
+        what, source = f"continuum: drag after {travel:g} L of travel", "[Agarwal] section 4.7"
         table += [
             near(f"{what}: K", stiffness, DRAG[0], 0.15 * DRAG[0], source, unit="N/m²", note="μ_int is not given: 0.4"),
             near(f"{what}: λ", inertia, DRAG[1], 0.3, source, note="a fast plate heaps up sand ahead of itself"),
         ]
-    if pushed := [one for one in plates if not one["dragged"]]:
-        inertia = _fit(pushed)[1]
-        table.append(near("continuum: plate pushed down: λ", inertia, PUSH_LAMBDA, 0.5, "[Agarwal] Fig. B-3"))
     return table
 
 
@@ -111,7 +100,7 @@ def _wheel_rows(measured: Measured, wheels: list[dict[str, Any]]) -> list[Row]:
 def draw(measured: Measured, figure: Any) -> None:
     """Drag over speed, and rolling and sinkage of both wheels over their rate."""
     left, middle, right = figure.subplots(1, 3)
-    dragged = [one for one in found(measured, "rates") or [] if one["dragged"]]
+    dragged = found(measured, "rates") or []
     for travel, fill in zip(sorted({one["buried"] for one in dragged}), ("none", "full"), strict=False):
         for k, depth in enumerate(sorted({one["depth"] for one in dragged})):
             some = sorted((o["speed"], o["force"]) for o in dragged if (o["buried"], o["depth"]) == (travel, depth))

@@ -16,7 +16,7 @@ def plates():
     return results(DATA / "plates")
 
 
-@pytest.mark.parametrize("name", ["plates", "flat", "deep", "solids"])
+@pytest.mark.parametrize("name", ["plates", "flat", "deep", "rates", "wheels", "solids"])
 def test_they_are_whole(name):
     """What is there is as it was written; solids are still being added."""
     found = status(DATA / name)
