@@ -11,12 +11,18 @@ import numpy as np
 
 from rftsim.demo import measure
 from rftsim.validation.shipped import Results, found, shipped
-from rftsim.validation.study import Measured, Request, Row, near
+from rftsim.validation.study import Measured, Request, Row, at_least, near
 
 RATES: Final = {"grouser-wheel": (10.0, 30.0, 60.0, 90.0), "four-flap-runner": (60.0, 100.0, 300.0)}
 """Of the shipped wheels, by scene [1/min]."""
 DRAG: Final = (580.0, 1.1)
 """K [N/m^2] and lambda of [Agarwal] section 4.7."""
+TRENDS: Final = (
+    ("the wheel's v/(Rω) at 10 over at 90 RPM", "grouser-wheel", "rolling", 10.0, 90.0, "[Agarwal] Fig. 4-7"),
+    ("the wheel's sinkage at 90 over at 10 RPM", "grouser-wheel", "sinkage", 90.0, 10.0, "[Agarwal] Fig. 4-7"),
+    ("the runner's sinkage at 100 over at 300 RPM", "four-flap-runner", "sinkage", 100.0, 300.0, "[Agarwal] Fig. 4-9"),
+)
+"""Of two rates, that of the first over that of the second is more than one: what, scene, quantity, rates, source."""
 UNSTEADY: Final = 0.05
 """A change of the speed over the means' time that a reader is told of [-]."""
 
@@ -95,6 +101,10 @@ def _wheel_rows(measured: Measured, wheels: list[dict[str, Any]]) -> list[Row]:
             drop = one["expected_drop"]
             what = f"continuum: δh behind the wheel at {one['rpm']:g} RPM"
             table.append(near(what, 1e3 * one["drop"], 1e3 * drop, 150.0 * drop, "[Agarwal]: r²ω²/g", unit="mm"))
+    for what, scene, name, slow, fast, source in TRENDS:
+        own = {one["rpm"]: one[name] for one in wheels if one["scene"] == scene}
+        if slow in own and fast in own:
+            table.append(at_least(f"continuum: {what}", own[slow] / own[fast], 1.0, source))
     return table
 
 
