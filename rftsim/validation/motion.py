@@ -10,6 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from rftsim.demo import measure
+from rftsim.validation.plates import fit_terms
 from rftsim.validation.shipped import Results, found, shipped
 from rftsim.validation.study import Measured, Request, Row, at_least, near
 
@@ -70,10 +71,11 @@ def rows(measured: Measured) -> list[Row]:
 
 
 def _fit(plates: list[dict[str, float]]) -> tuple[float, float]:
-    """K and lambda of F = K z + lambda rho L v^2 by least squares."""
-    basis = [[one["depth"], one["rho"] * one["length"] * one["speed"] ** 2] for one in plates]
-    (stiffness, inertia), *_ = np.linalg.lstsq(np.array(basis), np.array([one["force"] for one in plates]), rcond=None)
-    return float(stiffness), float(inertia)
+    """K and lambda of F = K z + lambda rho L v^2."""
+    rho, length, speed, depth, force = (
+        np.array([one[name] for one in plates]) for name in ("rho", "length", "speed", "depth", "force")
+    )
+    return fit_terms(depth, rho * length * speed**2, force)
 
 
 def _plate_rows(plates: list[dict[str, float]]) -> list[Row]:

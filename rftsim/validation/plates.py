@@ -69,7 +69,7 @@ def drag() -> dict[str, Any]:
     sand = DRAG_SAND.replace(zeta=K_DRAG / unit)  # the sand in which a slow plate has the published K
     found = [[force(sand, depth, speed) for speed in DRAG_SPEEDS] for depth in DRAG_DEPTHS]
     z, v = np.meshgrid(DRAG_DEPTHS, DRAG_SPEEDS, indexing="ij")
-    stiffness, inertia = _fit(z, DRAG_SAND.density() * DRAG_LENGTH * v**2, np.array(found))
+    stiffness, inertia = fit_terms(z, DRAG_SAND.density() * DRAG_LENGTH * v**2, np.array(found))
     return {"force": found, "stiffness": stiffness, "inertia": inertia, "zeta": sand.zeta}
 
 
@@ -81,7 +81,7 @@ def push() -> dict[str, Any]:
         moved = surface_force(plate, PUSH_SAND, "drft2d", position=(0, 0, -PUSH_DEPTH), velocity=(0, 0, -speed))
         found.append(float(moved.force[2]))
     v2 = np.array(PUSH_SPEEDS) ** 2
-    static, inertia = _fit(np.full(len(v2), PUSH_DEPTH), PUSH_SAND.density() * PUSH_LENGTH * v2, np.array(found))
+    static, inertia = fit_terms(np.full(len(v2), PUSH_DEPTH), PUSH_SAND.density() * PUSH_LENGTH * v2, np.array(found))
     return {"force": found, "stiffness": static, "inertia": inertia, "zeta": PUSH_SAND.zeta}
 
 
@@ -99,13 +99,13 @@ def oblique(angles_deg: tuple[int, ...]) -> dict[str, Any]:
             force.append(-float(moved @ normal))
         v_n2 = (np.array(OBLIQUE_SPEEDS) * np.sin(angle)) ** 2
         area = OBLIQUE_LENGTH * OBLIQUE_DEPTH
-        inertia.append(_fit(np.ones(len(force)), OBLIQUE_SAND.density() * area * v_n2, np.array(force))[1])
+        inertia.append(fit_terms(np.ones(len(force)), OBLIQUE_SAND.density() * area * v_n2, np.array(force))[1])
         found.append(force)
     return {"force": found, "inertia": inertia, "angles_deg": list(angles_deg)}
 
 
-def _fit(static: Array, dynamic: Array, force: Array) -> tuple[float, float]:
-    """Factors of two terms by least squares."""
+def fit_terms(static: Array, dynamic: Array, force: Array) -> tuple[float, float]:
+    """Factors of two terms of a force by least squares."""
     basis = np.column_stack([static.ravel(), dynamic.ravel()])
     (first, second), *_ = np.linalg.lstsq(basis, force.ravel(), rcond=None)
     return float(first), float(second)

@@ -44,7 +44,7 @@ STUDIES: Final = {
 """Every study by name."""
 
 
-SHARED: Final = ("balance", "cmu", "pockets", "shipped", "terramechanics")
+SHARED: Final = ("balance", "cmu", "plates", "pockets", "shipped", "terramechanics")
 """Modules that studies compute with."""
 
 

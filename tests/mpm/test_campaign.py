@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import math
 import os
 import signal
 import subprocess
@@ -49,6 +50,20 @@ def test_pushes_are_jobs_too(tmp_path):
     assert found["push"]["shape"] == "sphere"
     assert found["force"][0] < 0.0
     assert found["force"][1] == found["moment_N_m"][0] == found["moment_N_m"][2] == 0.0
+
+
+def test_wheels_are_jobs_too(tmp_path):
+    """A wheel that has just been let go sinks under its weight, and its slip is that of its speed."""
+    path = tmp_path / "wheels.toml"
+    path.write_text("[[wheels]]\nrpm = [60.0]\ndx = 0.0055\nduration = 0.03\n")
+    begin(tmp_path / "out", read_jobs(path))
+    assert run(tmp_path / "out", 1, lambda name: None) == []
+    (found,) = results(tmp_path / "out")
+    wheel = found["wheel"]
+    rim = 2.0 * math.pi * wheel["rpm"] / 60.0 * (wheel["radius"] + wheel["height"])
+    assert found["slip"] == pytest.approx(1.0 - found["speed_m_s"] / rim)
+    assert found["sinkages_m"][-1] > found["sinkages_m"][0]
+    assert len(found["time_s"]) == len(found["speeds_m_s"]) == len(found["sinkages_m"])
 
 
 @pytest.mark.parametrize(
