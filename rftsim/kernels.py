@@ -11,11 +11,12 @@ must stay one.
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from numba import njit
+from numba import carray, njit, types
 
 from rftsim import tables
-from rftsim.choice import FASTMATH, LOOK, ROOM, choosing, columns_on_stack, filled_up
-from rftsim.packed import BLOCK
+from rftsim.choice import FASTMATH, LOOK, ROOM, choosing, columns_on_stack, filled_up, next_run
+from rftsim.memory import on_stack, peek
+from rftsim.packed import BLOCK, COLUMNS, HEADER
 
 TINY = 1e-300
 STEP = 1e300
@@ -162,14 +163,15 @@ def _stress_2d(nx, ny, nz, vx, vy, vz, frame, medium):
     ex, ey, ez = frame.forward
     px = nx * ex + ny * ey + nz * ez
     pz = nx * ux + ny * uy + nz * uz
-    projected = np.sqrt(px * px + pz * pz)
-    flat = 1.0 / (projected + TINY)
-    px *= flat
-    pz *= flat
     wx = vx * ex + vy * ey + vz * ez
     wz = vx * ux + vy * uy + vz * uz
-    speed2 = wx * wx + wz * wz
-    inverse = 1.0 / np.sqrt(speed2 + TINY)
+    projected2, speed2 = px * px + pz * pz, wx * wx + wz * wz
+    length, speed = np.sqrt(projected2 + TINY), np.sqrt(speed2 + TINY)
+    both = 1.0 / (length * speed)  # one division for two
+    flat, inverse = both * speed, both * length
+    projected = projected2 * flat
+    px *= flat
+    pz *= flat
     mirror = 1.0 if wx >= 0.0 else -1.0
     mx = mirror * px  # sin beta and -cos beta but for one sign, which 2 beta does not see
     mz = pz
@@ -210,11 +212,13 @@ def _depth(x, y, z, frame):
 
 
 @njit(fastmath=FASTMATH, error_model="numpy", forceinline=True)
-def deepest(cx, cy, cz, first, last, frame):
-    """Largest depth of triangles first to last [m]."""
-    found = -1e30
-    for i in range(first, last):
-        found = larger(found, _depth(cx[i], cy[i], cz[i], frame))
+def deepest(body, frame):
+    """Largest depth of a body's triangles [m]; any negative number where none is in the sand."""
+    found, size, last = -1e30, int(body[14]), 0
+    while last < size:
+        first, last = next_run(body, last, frame, 0.0)
+        for i in range(HEADER + first, HEADER + last):
+            found = larger(found, _depth(peek(body, i), peek(body, i + size), peek(body, i + 2 * size), frame))
     return found
 
 
@@ -260,6 +264,10 @@ def _reach2(medium):
     return 1.01 * reach * reach
 
 
+_ANY: Final = 1.01
+"""The same where all count."""
+
+
 def _sums(stress: Any, leads: Any) -> Any:
     choose = _choosing(leads, later=False)
 
@@ -292,13 +300,13 @@ def _sums(stress: Any, leads: Any) -> Any:
         return fx, fy, fz, tx, ty, tz
 
     @njit(fastmath=FASTMATH, error_model="numpy", forceinline=True)
-    def sums(cx, cy, cz, nx, ny, nz, area, first, last, frame, medium):
-        """Force [N] and moment [N m] about the body's origin on triangles first to last, as six numbers."""
+    def sums(body, frame, medium):
+        """Force [N] and moment [N m] about a packed body's origin, as six numbers."""
         chosen, n, reach2, total = columns_on_stack(), 0, _reach2(medium), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-        for start in range(first, last, LOOK):
-            end = min(start + LOOK, last)
-            n = choose((cx, cy, cz, nx, ny, nz, area), start, end, frame, reach2, 0.0, chosen, n)
-            if n > ROOM - LOOK or end == last:
+        size, last = int(body[14]), 0
+        while last < size:
+            n, last = choose(body, last, frame, 0.0, reach2, 0.0, chosen, n)
+            if n > ROOM - LOOK or last >= size:
                 total, n = add(chosen, filled_up(chosen, n), frame, medium, total), 0
         return total
 
@@ -367,21 +375,21 @@ def _sums_ahead(stress: Any, leads: Any) -> Any:
         return fx, fy, fz, tx, ty, tz, fx1, fy1, fz1, tx1, ty1, tz1
 
     @njit(fastmath=FASTMATH, error_model="numpy", forceinline=True)
-    def sums_ahead(cx, cy, cz, nx, ny, nz, area, first, last, frame, medium, v_c, h):
+    def sums_ahead(body, frame, medium, v_c, h, margin):
         """The sums of a law made continuous at rest, now and at the depths after a time h of this motion.
 
         The stress per depth is scaled by |v| / sqrt(|v|^2 + v_c^2): the force of a law that knows only the direction
-        of motion falls to zero at rest.
+        of motion falls to zero at rest. No triangle moves further than the margin in the time.
 
         Returns:
             Force and moment at the present depths, and force and moment at the later ones.
         """
         chosen, n, reach2 = columns_on_stack(), 0, _reach2(medium)
         total = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-        for start in range(first, last, LOOK):
-            end = min(start + LOOK, last)
-            n = choose((cx, cy, cz, nx, ny, nz, area), start, end, frame, reach2, h, chosen, n)
-            if n > ROOM - LOOK or end == last:
+        size, last = int(body[14]), 0
+        while last < size:
+            n, last = choose(body, last, frame, margin, reach2, h, chosen, n)
+            if n > ROOM - LOOK or last >= size:
                 total, n = add(chosen, filled_up(chosen, n), frame, medium, v_c, h, total), 0
         return total
 
@@ -393,24 +401,22 @@ STEP_ASIDE = 1e-7
 
 
 _JACOBIAN: Final = 9
-"""Numbers of a triangle's derivative, which lie in a jacobian's scratch before the triangles' columns."""
-SCRATCH: Final = (_JACOBIAN + 7) * BLOCK
-"""Numbers of a jacobian's scratch."""
+"""Numbers of a triangle's derivative, which lie before the triangles' columns: LLVM tells parts of one array apart."""
+_scratch = on_stack((_JACOBIAN + COLUMNS) * BLOCK, types.float64)
 
 
-def _jacobians(stress: Any) -> Any:
+def _jacobians(stress: Any, leads: Any) -> Any:
+    choose = _choosing(leads, later=False)
+
     @njit(fastmath=FASTMATH, error_model="numpy")
-    def stiffness(frame, medium, v_c, completed, k):
-        """Derivative of each triangle's force by its velocity: nine runs of BLOCK in k, before the triangles' columns.
-
-        One array and BLOCK triangles, always: LLVM gives up on telling more arrays apart.
-        """
+    def stiffness(n, frame, medium, v_c, completed, k):
+        """Derivative of each of n triangles' force by its velocity: nine runs of BLOCK in k, before their columns."""
         v0x, v0y, v0z = frame.v0
         wx, wy, wz = frame.omega
         # the completed derivative takes the leading-edge rule apart
         ramp = (1.0 - completed) * medium.ramp
         bare = Medium(medium.xi, medium.mu_surf, medium.lambda_rho, medium.edge_on, ramp, medium.table)
-        for i in range(BLOCK):
+        for i in range(n):
             x, y, z = k[i + 9 * BLOCK], k[i + 10 * BLOCK], k[i + 11 * BLOCK]
             n0, n1, n2, area = k[i + 12 * BLOCK], k[i + 13 * BLOCK], k[i + 14 * BLOCK], k[i + 15 * BLOCK]
             vx = v0x + wy * z - wz * y
@@ -453,36 +459,44 @@ def _jacobians(stress: Any) -> Any:
             k[i + 8 * BLOCK] = e2 * p2 + f2 * q2 + along * s2 * c + brake * i2 * i2 + edge * m2 * m2
 
     @njit(fastmath=FASTMATH, error_model="numpy")
-    def jacobian(frame, medium, v_c, completed, scratch, out):
-        """Add the derivative of `sums_ahead`'s force and moment by the body's twist to out, (6, 6).
+    def jacobian(body, frame, medium, v_c, completed, out):
+        """Add the derivative of `sums_ahead`'s present force and moment by the body's twist to out, (6, 6).
 
         A law depends on the direction of motion alone but for the scale at rest and the inertial term, so two
         differences across the motion and those two closed forms give all of it.
 
         `completed` (0 or 1) asks for a matrix that cannot overshoot where the law jumps: tangent across the motion and
         secant along it (1 / r instead of v_c^2 / r^3, r^2 = |v|^2 + v_c^2), and secant where a face's edge leads.
-
-        The BLOCK triangles' columns lie in `scratch`, (SCRATCH,), from `COLUMNS_AT` on.
         """
-        stiffness(frame, medium, v_c, completed, scratch)
-        for row in range(3):
-            _add_rows(scratch, row, out)
+        chosen, n, size, last = columns_on_stack(), 0, int(body[14]), 0
+        k = carray(_scratch(), ((_JACOBIAN + COLUMNS) * BLOCK,))
+        reach2 = _ANY if completed > 0.0 else _reach2(medium)
+        while last < size:
+            n, last = choose(body, last, frame, 0.0, reach2, 0.0, chosen, n)
+            if n > ROOM - LOOK or last >= size:
+                n = filled_up(chosen, n)
+                for first in range(0, n, BLOCK):
+                    some = min(BLOCK, n - first)
+                    for column in range(COLUMNS):
+                        for i in range(some):
+                            k[i + (_JACOBIAN + column) * BLOCK] = chosen[first + i + column * ROOM]
+                    stiffness(some, frame, medium, v_c, completed, k)
+                    for row in range(3):
+                        _add_rows(some, k, row, out)
+                n = 0
 
     return jacobian
 
 
-COLUMNS_AT: Final = _JACOBIAN * BLOCK
-
-
 @njit(fastmath=FASTMATH, error_model="numpy")
-def _add_rows(k, row, out):
-    """Add the share of one component of the triangles' forces to out, (6, 6); k is a jacobian's scratch."""
+def _add_rows(n, k, row, out):
+    """Add the share of one component of n triangles' forces to out, (6, 6); k is a jacobian's scratch."""
     f0 = f1 = f2 = f3 = f4 = f5 = 0.0
     x0 = x1 = x2 = x3 = x4 = x5 = 0.0
     y0 = y1 = y2 = y3 = y4 = y5 = 0.0
     z0 = z1 = z2 = z3 = z4 = z5 = 0.0
     start = 3 * row * BLOCK
-    for i in range(BLOCK):
+    for i in range(n):
         x, y, z = k[i + 9 * BLOCK], k[i + 10 * BLOCK], k[i + 11 * BLOCK]
         u, v, w = k[start + i], k[start + i + BLOCK], k[start + i + 2 * BLOCK]
         p, q, r = w * y - v * z, u * z - w * x, v * x - u * y  # by the angular velocity: velocity is omega x r
@@ -505,6 +519,9 @@ sums_2d, tractions_2d = _sums(_stress_2d, _leads_2d), _tractions(_stress_2d)
 sums_3d, tractions_3d = _sums(_stress_3d_cubic, _leads_3d), _tractions(_stress_3d_cubic)
 sums_3d_quartic, tractions_3d_quartic = _sums(_stress_3d_quartic, _leads_3d), _tractions(_stress_3d_quartic)
 
-ahead_2d, jacobian_2d = _sums_ahead(_stress_2d, _leads_2d), _jacobians(_stress_2d)
-ahead_3d, jacobian_3d = _sums_ahead(_stress_3d_cubic, _leads_3d), _jacobians(_stress_3d_cubic)
-ahead_3d_quartic, jacobian_3d_quartic = _sums_ahead(_stress_3d_quartic, _leads_3d), _jacobians(_stress_3d_quartic)
+ahead_2d, jacobian_2d = _sums_ahead(_stress_2d, _leads_2d), _jacobians(_stress_2d, _leads_2d)
+ahead_3d, jacobian_3d = _sums_ahead(_stress_3d_cubic, _leads_3d), _jacobians(_stress_3d_cubic, _leads_3d)
+ahead_3d_quartic, jacobian_3d_quartic = (
+    _sums_ahead(_stress_3d_quartic, _leads_3d),
+    _jacobians(_stress_3d_quartic, _leads_3d),
+)

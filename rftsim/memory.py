@@ -78,31 +78,62 @@ def room(typing_context: Any, size: Any) -> Any:
     """The address of so many float64, a constant, that live as long as the calling function runs."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        place = alloca_once(builder, ir.ArrayType(ir.DoubleType(), size.literal_value))
+        place = _reserved(builder, ir.DoubleType(), size.literal_value)
         return builder.ptrtoint(place, context.get_value_type(types.intp))
 
     return (types.intp(size), generate) if isinstance(size, types.IntegerLiteral) else None
+
+
+def _reserved(builder: Any, element: Any, size: int) -> Any:
+    """Space on the stack of the function under construction; the optimiser can tell it from all other."""
+    place = alloca_once(builder, ir.ArrayType(element, size))
+    place.align = 64
+    return place
+
+
+def on_stack(size: int, element: Any) -> Any:
+    """What gives compiled code a pointer to `size` numbers on its function's stack."""
+
+    @intrinsic
+    def reserve(typing_context: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            place = _reserved(builder, context.get_value_type(element), size)
+            return builder.bitcast(place, context.get_value_type(signature.return_type))
+
+        return types.CPointer(element)(), generate
+
+    return reserve
+
+
+def _place(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    array = context.make_array(signature.args[0])(context, builder, arguments[0])
+    return builder.gep(array.data, [arguments[1]])
+
+
+@intrinsic
+def peek(typing_context: Any, array: Any, index: Any) -> Any:
+    """The number of a contiguous array at an index that is not negative, on which numba's own way there spends time."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return builder.load(_place(context, builder, signature, arguments))
+
+    return array.dtype(array, types.intp), generate
+
+
+@intrinsic
+def poke(typing_context: Any, array: Any, index: Any, number: Any) -> Any:
+    """Set the number of a contiguous array at an index that is not negative."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        builder.store(arguments[2], _place(context, builder, signature, arguments))
+
+    return types.void(array, types.intp, array.dtype), generate
 
 
 # The interpreter exports these symbols, and they need no interpreter lock.
 take = types.ExternalFunction("PyMem_RawMalloc", types.intp(types.uintp))
 allocate = types.ExternalFunction("PyMem_RawCalloc", types.intp(types.uintp, types.uintp))
 release = types.ExternalFunction("PyMem_RawFree", types.void(types.intp))
-
-
-def on_stack(size: int, element: Any) -> Any:
-    """What gives compiled code `size` numbers on its function's stack; the optimiser can tell them from all others."""
-
-    @intrinsic
-    def reserve(typing_context: Any) -> Any:
-        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-            place = alloca_once(builder, ir.ArrayType(context.get_value_type(element), size))
-            place.align = 64
-            return builder.bitcast(place, context.get_value_type(signature.return_type))
-
-        return types.CPointer(element)(), generate
-
-    return reserve
 
 
 def tuples(size: int, element: Any) -> Any:

@@ -7,7 +7,6 @@ from numba import njit, types
 
 from rftsim import kernels, packed, unpack
 from rftsim.entries import address, entry
-from rftsim.kernels import SCRATCH
 from rftsim.memory import doubles, matrix, room
 from rftsim.native_law import surface_at
 
@@ -63,24 +62,15 @@ def ahead(sand, surface, frame, xmat, twist, h, out):
     """Wrench continuous at rest, world frame: at the present depths, and at those after a time h, (12,)."""
     s, body, r = doubles(sand, packed.SAND_SIZE), surface_at(surface), doubles(xmat, 9)
     f, medium = moving_frame(doubles(frame, FRAME), r, doubles(twist, 6)), _soft_medium(s, body)
-    cx, cy, cz, nx, ny, nz, area = unpack.columns(body)
     total, reach = doubles(out, 12), _reach(body, f, h)
-    for k in range(12):
-        total[k] = 0.0
-    last = 0
-    while last < area.size:
-        first, last = unpack.next_run(body, last, area.size, f, reach)
-        if s[0] == 0.0:
-            g = kernels.ahead_2d(cx, cy, cz, nx, ny, nz, area, first, last, f, medium, V_C, h)
-        elif s[0] == 1.0:
-            g = kernels.ahead_3d(cx, cy, cz, nx, ny, nz, area, first, last, f, medium, V_C, h)
-        else:
-            g = kernels.ahead_3d_quartic(cx, cy, cz, nx, ny, nz, area, first, last, f, medium, V_C, h)
-        for part in range(0, 12, 3):
-            a, b, c = unpack.to_world(r, g[part], g[part + 1], g[part + 2])
-            total[part] += a
-            total[part + 1] += b
-            total[part + 2] += c
+    if s[0] == 0.0:
+        g = kernels.ahead_2d(body, f, medium, V_C, h, reach)
+    elif s[0] == 1.0:
+        g = kernels.ahead_3d(body, f, medium, V_C, h, reach)
+    else:
+        g = kernels.ahead_3d_quartic(body, f, medium, V_C, h, reach)
+    for part in range(0, 12, 3):
+        total[part], total[part + 1], total[part + 2] = unpack.to_world(r, g[part], g[part + 1], g[part + 2])
 
 
 @entry(types.void, *[address] * 5, types.float64, address)
@@ -88,26 +78,16 @@ def jacobian(sand, surface, frame, xmat, twist, completed, out):
     """Derivative of `ahead`'s present wrench by the twist, world frame, (6, 6)."""
     s, body, r = doubles(sand, packed.SAND_SIZE), surface_at(surface), doubles(xmat, 9)
     f, medium = moving_frame(doubles(frame, FRAME), r, doubles(twist, 6)), _soft_medium(s, body)
-    count = int(body[14])
-    scratch = doubles(room(SCRATCH), SCRATCH)
     local, turned = matrix(room(36), 6, 6), matrix(room(36), 6, 6)
     for i in range(6):
         for k in range(6):
             local[i, k] = 0.0
-    for first in range(0, count, packed.BLOCK):
-        if unpack.block_is_clear(body, first // packed.BLOCK, f, 0.0):
-            continue
-        for column in range(packed.COLUMNS):
-            start = packed.HEADER + column * count + first
-            for i in range(packed.BLOCK):  # past the last triangle, ones without area
-                value = body[start + i] if first + i < count else 0.0
-                scratch[kernels.COLUMNS_AT + column * packed.BLOCK + i] = value
-        if s[0] == 0.0:
-            kernels.jacobian_2d(f, medium, V_C, completed, scratch, local)
-        elif s[0] == 1.0:
-            kernels.jacobian_3d(f, medium, V_C, completed, scratch, local)
-        else:
-            kernels.jacobian_3d_quartic(f, medium, V_C, completed, scratch, local)
+    if s[0] == 0.0:
+        kernels.jacobian_2d(body, f, medium, V_C, completed, local)
+    elif s[0] == 1.0:
+        kernels.jacobian_3d(body, f, medium, V_C, completed, local)
+    else:
+        kernels.jacobian_3d_quartic(body, f, medium, V_C, completed, local)
     g = matrix(out, 6, 6)
     for half in range(0, 6, 3):  # R G R'
         for k in range(6):

@@ -47,6 +47,7 @@ def build(part: str, cpu: str | None = None) -> bytes:
         whole.link_in(llvm.parse_assembly(_entry(name, signature, result.fndesc.mangled_name)))
     machine = _machine(cpu)
     _strip(whole, own, machine)
+    _optimise(whole, machine)
     return bytes(machine.emit_object(whole))
 
 
@@ -91,10 +92,20 @@ def _strip(module: llvm.ModuleRef, keep: Any, machine: llvm.TargetMachine) -> No
             value.linkage = "private"
     passes = llvm.create_new_module_pass_manager()
     passes.add_global_dead_code_eliminate_pass()
-    passes.run(module, llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options()))
+    passes.run(module, _builder(machine))
     for value in (*module.functions, *module.global_variables):
         if value.is_declaration and not _OUTSIDE.fullmatch(value.name):
             raise RuntimeError(f"compiled code needs {value.name}, which machine code on its own cannot have")
+
+
+def _optimise(module: llvm.ModuleRef, machine: llvm.TargetMachine) -> None:
+    """Once more, as a whole: what calls what is known now, so that arguments which nobody reads can go."""
+    builder = _builder(machine)
+    builder.getModulePassManager().run(module, builder)
+
+
+def _builder(machine: llvm.TargetMachine) -> llvm.PassBuilder:
+    return llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options(speed_level=3))
 
 
 def ship() -> None:

@@ -27,21 +27,14 @@ def wrench(sand, surface, xpos, xmat, velocity, omega, out):
     if unpack.is_clear(s, body, x, r):
         return
     f, medium = unpack.frame_of(s, body, x, r, v, w), unpack.medium_of(s, body)
-    cx, cy, cz, nx, ny, nz, area = unpack.columns(body)
-    last = 0
-    while last < area.size:
-        first, last = unpack.next_run(body, last, area.size, f, 0.0)
-        if s[0] == 0.0:
-            g = kernels.sums_2d(cx, cy, cz, nx, ny, nz, area, first, last, f, medium)
-        elif s[0] == 1.0:
-            g = kernels.sums_3d(cx, cy, cz, nx, ny, nz, area, first, last, f, medium)
-        else:
-            g = kernels.sums_3d_quartic(cx, cy, cz, nx, ny, nz, area, first, last, f, medium)
-        for part in range(0, 6, 3):
-            a, b, c = unpack.to_world(r, g[part], g[part + 1], g[part + 2])
-            total[part] += a
-            total[part + 1] += b
-            total[part + 2] += c
+    if s[0] == 0.0:
+        g = kernels.sums_2d(body, f, medium)
+    elif s[0] == 1.0:
+        g = kernels.sums_3d(body, f, medium)
+    else:
+        g = kernels.sums_3d_quartic(body, f, medium)
+    total[0], total[1], total[2] = unpack.to_world(r, g[0], g[1], g[2])
+    total[3], total[4], total[5] = unpack.to_world(r, g[3], g[4], g[5])
 
 
 @entry(types.void, *[address] * 8)

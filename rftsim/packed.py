@@ -24,12 +24,12 @@ SAND_SIZE: Final = len(SAND_FIELDS) + 3 * TERMS
 STRENGTHS: Final = [SAND_FIELDS.index(name) for name in ("xi_n", "zeta")]
 """Where a packed sand has what scales its force, under the 3D laws and under the 2D ones."""
 
-HEADER: Final = 16
+HEADER: Final = 19
 """Numbers before the triangles of a packed surface.
 
 0 leading-edge tolerance; 1-3 and 4-6 lowest and highest corner; 7-9 wheel axis, 10-12 wheel centre, 13 wheel radius
 (zero where the body is no wheel); 14 number of triangles; 15 their root-mean-square
-distance from the origin.
+distance from the origin; 16-18 direction at which the wheel's angles start.
 """
 COLUMNS: Final = 7
 """Numbers per triangle, each a column: centre (3), normal (3), area."""
@@ -38,6 +38,10 @@ BLOCK: Final = 32
 the columns."""
 BOX: Final = 6
 """Numbers of a box: centre and half its size, in the body frame."""
+RIM: Final = 0.7
+"""A wheel's triangle is of its rim where its normal is no nearer to the axis than by this cosine."""
+NO_RIM: Final = 9.0
+"""Instead of the angle about the axis, of a wheel's other triangles. Behind its boxes stand each triangle's."""
 
 
 def pack_sand(sand: Sand, law: Law, free_surface: FreeSurface, plane: ArrayLike) -> Array:
@@ -71,7 +75,19 @@ def pack_surface(surface: Surface) -> Array:
         header[7:10], header[10:13], header[13] = surface.wheel.axis, surface.wheel.centre, surface.wheel.radius
     header[14] = surface.ntri
     header[15] = np.sqrt((surface.centres**2).sum(axis=1).mean())
-    return np.concatenate([header, *surface.centres.T, *surface.normals.T, surface.areas, _boxes(surface).ravel()])
+    angles = _rim_angles(surface, header) if surface.wheel is not None else np.empty(0)
+    columns = *surface.centres.T, *surface.normals.T, surface.areas
+    return np.concatenate([header, *columns, _boxes(surface).ravel(), angles])
+
+
+def _rim_angles(surface: Surface, header: Array) -> Array:
+    """Each triangle's angle about the wheel's axis [rad], (ntri,); the header gets the direction where they start."""
+    axis, centre = header[7:10], header[10:13]
+    start = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
+    header[16:19] = start = start / np.linalg.norm(start)
+    arm = surface.centres - centre
+    angles: Array = np.arctan2(arm @ np.cross(axis, start), arm @ start)
+    return np.where(np.abs(surface.normals @ axis) <= RIM, angles, NO_RIM)
 
 
 def _boxes(surface: Surface) -> Array:
@@ -84,7 +100,7 @@ def _boxes(surface: Surface) -> Array:
 def size_of(header: Array) -> int:
     """Numbers of the packed surface that starts with a header."""
     n = int(header[14])
-    return HEADER + COLUMNS * n + BOX * ((n + BLOCK - 1) // BLOCK)
+    return HEADER + COLUMNS * n + BOX * ((n + BLOCK - 1) // BLOCK) + (n if header[13] != 0.0 else 0)
 
 
 def read_columns(body: Array) -> tuple[Array, ...]:

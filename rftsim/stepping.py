@@ -110,13 +110,9 @@ def _deepest(p, b, v, h):
     implicit.twist_of(p, b, v, twist)
     address = equation.body_surface(p, b)
     surface = doubles(address, unpack.size_of(doubles(address, packed.HEADER)))
-    cx, cy, cz, _, _, _, area = unpack.columns(surface)
     frame, found = implicit.frame_at(p, b, twist), -1e30
     for _ in range(2):
-        last = 0
-        while last < area.size:
-            first, last = unpack.next_run(surface, last, area.size, frame, 0.0)
-            found = max(found, kernels.deepest(cx, cy, cz, first, last, frame))
+        found = max(found, kernels.deepest(surface, frame))
         turned, lowered = _turned(frame, h), _lowered(frame, h)
         frame = kernels.Frame(frame.v0, frame.omega, frame.up, turned, frame.forward, lowered, frame.rear, frame.drop)
     return found

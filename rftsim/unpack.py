@@ -4,10 +4,10 @@ import numpy as np
 from numba import carray, njit, types
 
 from rftsim import kernels, packed
-from rftsim.choice import FASTMATH
+from rftsim.choice import FASTMATH, block_is_clear
 from rftsim.kernels import Frame, Medium
-from rftsim.memory import on_stack, tuples
-from rftsim.packed import BLOCK, BOX, COLUMNS, HEADER, SAND_FIELDS, TERMS
+from rftsim.memory import on_stack, peek, tuples
+from rftsim.packed import BLOCK, BOX, COLUMNS, HEADER, NO_RIM, SAND_FIELDS, TERMS
 
 size_of = njit(forceinline=True)(packed.size_of)
 
@@ -26,27 +26,6 @@ def columns(body):
         body[start + 5 * n : start + 6 * n],
         body[start + 6 * n : start + 7 * n],
     )
-
-
-@njit(forceinline=True)
-def block_is_clear(body, block, frame, margin):
-    """Whether a block of triangles lies more than a margin above the undisturbed sand."""
-    start, r = HEADER + COLUMNS * int(body[14]) + BOX * block, frame.rise
-    middle = r[0] * body[start] + r[1] * body[start + 1] + r[2] * body[start + 2]
-    below = abs(r[0]) * body[start + 3] + abs(r[1]) * body[start + 4] + abs(r[2]) * body[start + 5]
-    return middle - below >= frame.height + margin
-
-
-@njit(forceinline=True)
-def next_run(body, start, count, frame, margin):
-    """The next triangles from start on whose blocks are not clear, first to last; both are count where none are."""
-    first = start
-    while first < count and block_is_clear(body, first // BLOCK, frame, margin):
-        first += BLOCK
-    last = first
-    while last < count and not block_is_clear(body, last // BLOCK, frame, margin):
-        last += BLOCK
-    return min(first, count), min(last, count)
 
 
 @njit(forceinline=True)
@@ -69,12 +48,12 @@ def to_body(xmat, x, y, z):
     )
 
 
-@njit(forceinline=True)
+@njit(fastmath=FASTMATH, forceinline=True)
 def _cross(a, b):
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-@njit(forceinline=True)
+@njit(fastmath=FASTMATH, forceinline=True)
 def _dot(a, b):
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
@@ -117,8 +96,7 @@ def frame_of(sand, body, xpos, xmat, velocity, omega):
     return Frame(v0, w, up, up, frame.forward, height, rear, drop)
 
 
-_angles = on_stack(BLOCK, types.float64)
-_NO_RIM = 9.0
+_angles, _least, _most = (on_stack(BLOCK, types.float64) for _ in range(3))
 
 
 @njit(forceinline=True)
@@ -136,7 +114,7 @@ def _structural(sand, body, frame, plane):
     level = np.sqrt(max(1.0 - along * along, 0.0))
     if spin == 0.0 or level < 1e-3:  # a wheel at rest, or lying on its side
         return nothing
-    cross = _cross(axis, frame.up)
+    cross, start = _cross(axis, frame.up), (body[16], body[17], body[18])
     sign = (1.0 if spin > 0.0 else -1.0) / level
     ahead = sign * cross[0], sign * cross[1], sign * cross[2]
     down = (
@@ -144,19 +122,10 @@ def _structural(sand, body, frame, plane):
         (along * axis[1] - frame.up[1]) / level,
         (along * axis[2] - frame.up[2]) / level,
     )
-    first, last, angles = 3.0, -3.0, carray(_angles(), (BLOCK,))
-    count = int(body[14])
-    for start in range(0, count, BLOCK):
-        if block_is_clear(body, start // BLOCK, frame, 0.0):
-            continue
-        end = min(start + BLOCK, count)
-        _rim_angles(columns(body), start, end, frame, axis, centre, ahead, down, plane, sand[1], angles)
-        for i in range(end - start):
-            first = kernels.smaller(angles[i], first)
-            last = kernels.larger(angles[i] if angles[i] < _NO_RIM else last, last)
+    first, last = _arc(body, frame, plane, sand[1], np.arctan2(_dot(down, _cross(axis, start)), _dot(down, start)))
     if last < first:
         return nothing
-    middle = 0.5 * (_angle(first) + _angle(last))
+    middle = -0.5 * (first + last) if spin > 0.0 else 0.5 * (first + last)
     s, c = np.sin(middle), np.cos(middle)
     onward = (
         c * ahead[0] - s * down[0],
@@ -168,33 +137,43 @@ def _structural(sand, body, frame, plane):
     return (onward[0], onward[1], onward[2], offset), radius * radius * spin * spin / sand[15]
 
 
+@njit(forceinline=True)
+def _arc(body, frame, plane, planar, down):
+    """First and last of the rim's submerged leading triangles, by their angle from down on; last < first where none."""
+    least, most = carray(_least(), (BLOCK,)), carray(_most(), (BLOCK,))
+    angles = carray(_angles(), (BLOCK,))
+    for i in range(BLOCK):
+        angles[i] = least[i] = NO_RIM
+        most[i] = -NO_RIM
+    count = int(body[14])
+    for block in range((count + BLOCK - 1) // BLOCK):
+        if block_is_clear(body, block, frame, 0.0):
+            continue
+        start = BLOCK * block
+        _rim_angles(body, start, min(BLOCK, count - start), frame, plane, planar, down, angles)
+        for i in range(BLOCK):  # lane by lane: a minimum over all waits for each before it
+            least[i] = kernels.smaller(angles[i], least[i])
+            most[i] = kernels.larger(angles[i] if angles[i] < NO_RIM else -NO_RIM, most[i])
+    first, last = least[0], most[0]
+    for i in range(1, BLOCK):
+        first, last = kernels.smaller(least[i], first), kernels.larger(most[i], last)
+    return first, last
+
+
 @njit(fastmath=FASTMATH, error_model="numpy", forceinline=True)
-def _rim_angles(body_columns, start, end, frame, axis, centre, ahead, down, plane, planar, out):
-    """Fill out with the `_diamond` of each triangle that is rim, submerged and leading; or _NO_RIM."""
-    cx, cy, cz, nx, ny, nz, _ = body_columns
-    for i in range(start, end):
-        x, y, z = cx[i], cy[i], cz[i]
-        n, p = (nx[i], ny[i], nz[i]), (x - centre[0], y - centre[1], z - centre[2])
+def _rim_angles(body, start, count, frame, plane, planar, down, out):
+    """Fill out with the angle of each of count triangles that is rim, submerged and leading; or NO_RIM."""
+    size, at = int(body[14]), HEADER + start
+    angles = HEADER + COLUMNS * size + BOX * ((size + BLOCK - 1) // BLOCK) + start
+    for i in range(count):
+        x, y, z = peek(body, at + i), peek(body, at + i + size), peek(body, at + i + 2 * size)
+        n = peek(body, at + i + 3 * size), peek(body, at + i + 4 * size), peek(body, at + i + 5 * size)
         wv = _cross(frame.omega, (x, y, z))
         v = frame.v0[0] + wv[0], frame.v0[1] + wv[1], frame.v0[2] + wv[2]
         depth = frame.height - _dot(frame.up, (x, y, z))
         leading = _dot(n, v) - planar * _dot(n, plane) * _dot(v, plane)
-        counts = (depth > 0.0) & (leading > 0.0) & (abs(_dot(n, axis)) <= 0.7)
-        angle = _diamond(_dot(p, ahead), _dot(p, down))
-        out[i - start] = angle if counts else _NO_RIM
-
-
-@njit(error_model="numpy", forceinline=True)
-def _diamond(s, c):
-    """A number that grows with the angle atan2(s, c), in (-2, 2]; no trigonometry."""
-    t = s / (abs(s) + abs(c) + kernels.TINY)
-    side = 2.0 if s >= 0.0 else -2.0
-    return t if c >= 0.0 else side - t
-
-
-@njit(forceinline=True)
-def _angle(t):
-    """The angle whose _diamond is t."""
-    c = 1.0 - abs(t)
-    s = t if abs(t) <= 1.0 else (2.0 - t if t > 0.0 else -2.0 - t)
-    return np.arctan2(s, c)
+        on_rim = peek(body, angles + i)
+        angle = on_rim - down
+        angle -= 2.0 * np.pi if angle > np.pi else 0.0
+        angle += 2.0 * np.pi if angle < -np.pi else 0.0
+        out[i] = angle if (depth > 0.0) & (leading > 0.0) & (on_rim < NO_RIM) else NO_RIM

@@ -16,7 +16,7 @@ import numpy as np
 from rftsim import solids
 from rftsim.economy import middle
 from rftsim.laws import get_law
-from rftsim.packed import BLOCK, COLUMNS, pack_sand, pack_surface, read_columns
+from rftsim.packed import BLOCK, COLUMNS, pack_sand, pack_surface
 from rftsim.sand import FreeSurface, Sand
 from rftsim.surface import Array, Surface
 
@@ -119,7 +119,7 @@ def arithmetic() -> Arithmetic:
     sand = pack_sand(SAND, get_law(LAW), FreeSurface(), (0.0, 1.0, 0.0))
     surface = _ball(BLOCK)
     body = pack_surface(surface)
-    loops.sums(sand, body, *read_columns(body), *_motion(surface))
+    loops.sums(sand, body, *_motion(surface))
     operations = _count(next(iter(loops.sums.inspect_asm().values())))
     numbers = np.linspace(0.0, 0.5, 512)
     (seconds,) = _least([functools.partial(loops.polynomials, numbers, np.empty(numbers.size))], lambda _: None)

@@ -24,10 +24,10 @@ def evaluate(sand, body, position, turn, velocity, omega, out, count):
 
 
 @numba.njit(fastmath=FASTMATH, error_model="numpy")
-def sums(sand, body, cx, cy, cz, nx, ny, nz, area, position, turn, velocity, omega):
+def sums(sand, body, position, turn, velocity, omega):
     """The law's loop alone, whose instructions are counted."""
     frame, medium = unpack.frame_of(sand, body, position, turn, velocity, omega), unpack.medium_of(sand, body)
-    return kernels.sums_3d(cx, cy, cz, nx, ny, nz, area, 0, area.size, frame, medium)
+    return kernels.sums_3d(body, frame, medium)
 
 
 @numba.njit(fastmath={"contract"}, forceinline=True)

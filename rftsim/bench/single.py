@@ -11,7 +11,6 @@ import numba  # not `from`: what measures the package is not part of what its ma
 import numpy as np
 
 from rftsim import choice, kernels, unpack
-from rftsim.packed import read_columns
 from rftsim.surface import Array
 
 LARGEST: Final = 1e30
@@ -44,20 +43,19 @@ def measure(
     works: list[Callable[[int], Any]] = []
     out = []
     for loop, number in ((kernels.sums_3d, np.float64), (_single(), np.float32)):
-        columns = tuple(column.astype(number) for column in read_columns(body))
         out.append(np.zeros(6))
-        works.append(functools.partial(_repeated(loop), columns, *(_as(number, x) for x in (frame, medium)), out[-1]))
+        own = body.astype(number), _as(number, frame), _as(number, medium)
+        works.append(functools.partial(_repeated(loop), *own, out[-1]))
     double, single = least(works)
-    error = float(np.abs(out[1] - out[0]).max() / np.abs(out[0]).max())
-    return Single(len(columns[0]), 1e9 * double / len(columns[0]), 1e9 * single / len(columns[0]), error)
+    error, count = float(np.abs(out[1] - out[0]).max() / np.abs(out[0]).max()), int(body[14])
+    return Single(count, 1e9 * double / count, 1e9 * single / count, error)
 
 
 def _repeated(loop: Any) -> Any:
     @numba.njit(error_model="numpy")
-    def repeated(columns, frame, medium, out, count):  # type: ignore[no-untyped-def]
-        cx, cy, cz, nx, ny, nz, area = columns
+    def repeated(body, frame, medium, out, count):  # type: ignore[no-untyped-def]
         for _ in range(count):
-            g = loop(cx, cy, cz, nx, ny, nz, area, 0, area.size, frame, medium)
+            g = loop(body, frame, medium)
             for k in range(6):
                 out[k] = g[k]
 
