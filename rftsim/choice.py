@@ -8,11 +8,10 @@ from typing import Any, Final
 
 from numba import carray, njit, types
 
+from rftsim.dense import FASTMATH
 from rftsim.memory import on_stack, peek, poke
 from rftsim.packed import BLOCK, BOX, COLUMNS, HEADER
 
-FASTMATH: Final = {"reassoc", "contract", "arcp", "nsz"}
-"""Floating-point liberties of the compiled loops."""
 LOOK: Final = 4 * BLOCK
 """Triangles that are looked at together, at most."""
 ROOM: Final = 392

@@ -1,6 +1,11 @@
 """Small dense linear algebra for compiled code: loops beat LAPACK's overhead at these sizes and need no library."""
 
+from typing import Final
+
 from numba import njit
+
+FASTMATH: Final = {"reassoc", "contract", "arcp", "nsz"}
+"""Floating-point liberties of all compiled loops: what is no number stays none."""
 
 
 @njit
@@ -10,7 +15,7 @@ def copy(x, out):
         out[i] = x[i]
 
 
-@njit
+@njit(fastmath=FASTMATH)
 def dot(x, y):
     """The product x . y."""
     out = 0.0
@@ -19,7 +24,7 @@ def dot(x, y):
     return out
 
 
-@njit
+@njit(fastmath=FASTMATH)
 def multiply(a, x, out):
     """Fill out with A x."""
     for i in range(a.shape[0]):
@@ -29,7 +34,7 @@ def multiply(a, x, out):
         out[i] = total
 
 
-@njit
+@njit(fastmath=FASTMATH)
 def add_transposed(a, x, share, out):
     """Add share * A' x to out."""
     for i in range(a.shape[0]):
@@ -39,7 +44,7 @@ def add_transposed(a, x, share, out):
                 out[k] += a[i, k] * y
 
 
-@njit
+@njit(fastmath=FASTMATH)
 def factor(a, order):
     """LU factors of a square matrix, in place, by partial pivoting; `order` is filled with that of its rows."""
     n = a.shape[0]
@@ -65,7 +70,7 @@ def factor(a, order):
                     a[i, j] -= share * a[k, j]
 
 
-@njit
+@njit(fastmath=FASTMATH)
 def substitute(lu, order, b, out):
     """Fill out with the solution of A x = b from the factors of A; b and out differ."""
     n = lu.shape[0]

@@ -68,7 +68,7 @@ class Entries(NamedTuple):
     force: int
     """tau, (nv,)."""
     step: int
-    """h [s], and the size of the impulse h tau, (2,)."""
+    """h [s], size of the impulse h tau, and the speed v_c [m/s] below which a triangle's stress falls to zero, (3,)."""
 
     # Its solution.
     last: int
@@ -250,7 +250,7 @@ def lay_out(p, at, nbody, nv, nrow, state):
     ):
         at = _place(t, entry, at, nv)
     for entry in (AT.step, AT.flags, AT.timestep):
-        at = _place(t, entry, at, 2)
+        at = _place(t, entry, at, 3)
     for entry in (AT.derivative, AT.completed):
         at = _place(t, entry, at, 36 * nbody)
     at = _place(t, AT.points, at, 4 * point_size(nbody, nv))

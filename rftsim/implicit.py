@@ -5,7 +5,7 @@ it chatters and is biased; here v+ solves
 
     M (v+ - v) = h (tau + J' f(v+) + Q(v+)),
 
-tau the other smooth forces, f the constraints' by MuJoCo's own law, Q the sand's with |v| / sqrt(|v|^2 + V_C^2) before
+tau the other smooth forces, f the constraints' by MuJoCo's own law, Q the sand's with |v| / sqrt(|v|^2 + v_c^2) before
 each triangle's stress. The solver is Newton's method with kept derivatives of the sand (a rank-one update per body and
 iteration); each of its steps solves the constraints exactly for the sand's force linearised, which costs no evaluation.
 Where a step passes rest or the edge of a face, the next trial is at rest, or by a derivative that cannot overshoot.
@@ -20,13 +20,19 @@ import numpy as np
 from numba import njit
 
 from rftsim import dense, equation, rows
+from rftsim.dense import FASTMATH
 from rftsim.equation import AT, PART, POINT, ROW, VECTOR
 from rftsim.kernels import TINY
 from rftsim.memory import doubles, room
-from rftsim.native_ahead import V_C, ahead, jacobian, moving_frame
+from rftsim.native_ahead import ahead, jacobian, moving_frame
 
+V_C: Final = 3e-7
+"""Least speed v_c [m/s] below which a triangle's stress falls to zero; where all is at rest, bodies creep slower."""
+CREEP: Final = 1e-4
+"""v_c over the speed of the fastest body. A body at rest amid moving ones, loaded to near what the sand bears, is the
+hardest of all to solve for, and is so less often."""
 TOLERANCE: Final = 3e-3
-"""Allowed error of a sand body's velocity, relative; V_C is added."""
+"""Allowed error of a sand body's velocity, relative; v_c is added."""
 MOST: Final = 40
 """Iterations of one solution."""
 LOOSEST: Final = 20.0
@@ -38,7 +44,7 @@ NOTHING: Final = AT.nbody
 NEAR: Final = 0.25
 """Square of the share of a body's speed that is left where a step is said to pass its rest."""
 BESIDE: Final = 0.3
-"""Speed, over V_C, at which a body is tried beside its rest."""
+"""Speed, over v_c, at which a body is tried beside its rest."""
 
 
 @njit
@@ -47,7 +53,7 @@ def twist_of(p, b, v, out):
     dense.multiply(equation.body_jacobian(p, b), v, out)
 
 
-@njit
+@njit(fastmath=FASTMATH)
 def speed_of(p, b, v, lengths=1.0):
     """|velocity| + |angular velocity| times so many lengths of body b, at a generalised velocity [m/s]."""
     j, length = equation.body_jacobian(p, b), equation.body_length(p, b)
@@ -78,16 +84,22 @@ def generalised(p, at, later, out):
 
 
 @njit
+def at_rest(p):
+    """The speed v_c below which a triangle's stress falls to zero [m/s]."""
+    return doubles(equation.number(p, AT.step), 3)[2]
+
+
+@njit
 def evaluate(p, v, at):
     """Evaluate the wrenches at a velocity into a point."""
-    h = doubles(equation.number(p, AT.step), 2)[0]
+    h, v_c = doubles(equation.number(p, AT.step), 2)[0], at_rest(p)
     twist = doubles(room(6), 6)
     sand = equation.number(p, AT.sand)
     for b in range(equation.number(p, AT.nbody)):
         twist_of(p, b, v, twist)
         f, r = equation.body_frame(p, b).ctypes.data, equation.body_rotation(p, b).ctypes.data
         out = equation.point_wrench(p, at, b, 0).ctypes.data
-        ahead(sand, equation.body_surface(p, b), f, r, twist.ctypes.data, h, out)
+        ahead(sand, equation.body_surface(p, b), f, r, twist.ctypes.data, v_c, h, out)
     doubles(equation.number(p, AT.counts), 3)[0] += 1.0
 
 
@@ -101,7 +113,7 @@ def differentiate(p, v, entry):
         twist_of(p, b, v, twist)
         f, r = equation.body_frame(p, b).ctypes.data, equation.body_rotation(p, b).ctypes.data
         out = equation.derivative(p, entry, b).ctypes.data
-        jacobian(sand, equation.body_surface(p, b), f, r, twist.ctypes.data, completed, out)
+        jacobian(sand, equation.body_surface(p, b), f, r, twist.ctypes.data, at_rest(p), completed, out)
     doubles(equation.number(p, AT.counts), 3)[1] += 1.0
 
 
@@ -152,7 +164,7 @@ def attempt(p, k):
     wrong, error = equation.vector(p, VECTOR.solved), 0.0
     missing = size(p, residual)  # leaves the velocity error in scratch vector 1
     for b in range(equation.number(p, AT.nbody)):
-        error = max(error, speed_of(p, b, wrong) / (TOLERANCE * speed_of(p, b, v) + V_C))
+        error = max(error, speed_of(p, b, wrong) / (TOLERANCE * speed_of(p, b, v) + at_rest(p)))
     scores = equation.point_scores(p, at)
     scores[0], scores[1], scores[2] = missing, scale + TINY, error
 
@@ -179,6 +191,11 @@ def _linearise(p, entry):
     for b in range(equation.number(p, AT.nbody)):
         j, g = equation.body_jacobian(p, b), equation.derivative(p, entry, b)
         for r in range(6):
+            any_force = False
+            for c in range(6):
+                any_force = any_force or g[r, c] != 0.0
+            if not any_force:
+                continue
             for k in range(nv):
                 column[k] = 0.0
             for c in range(6):
@@ -344,7 +361,7 @@ def _rest_along(p, direction, share):
             aa += weight * a[k] * a[k]
             ac += weight * a[k] * c[k]
             cc += weight * c[k] * c[k]
-        if cc == 0.0 or ac >= 0.0 or -ac >= cc or aa < (10.0 * V_C) ** 2 or aa - ac * ac / cc > NEAR * aa:
+        if cc == 0.0 or ac >= 0.0 or -ac >= cc or aa < (10.0 * at_rest(p)) ** 2 or aa - ac * ac / cc > NEAR * aa:
             continue
         t = -ac / cc
         if found > 0.0 and t >= found:
@@ -356,7 +373,7 @@ def _rest_along(p, direction, share):
         missing = equation.vector(p, VECTOR.fixed)
         residual_of(p, there, q, missing)
         side = 1.0 if dense.dot(missing, direction) < 0.0 else -1.0
-        found = max(t + side * BESIDE * V_C / np.sqrt(cc), 1e-12)
+        found = max(t + side * BESIDE * at_rest(p) / np.sqrt(cc), 1e-12)
     return found * share
 
 
@@ -374,7 +391,7 @@ def _try_along(p, direction, t, k):
 def _is_small(p, change, v, share):
     """Whether a share of a velocity change makes no difference to any body."""
     for b in range(equation.number(p, AT.nbody)):
-        if share * speed_of(p, b, change) > CENTRED * speed_of(p, b, v) + 10.0 * V_C:
+        if share * speed_of(p, b, change) > CENTRED * speed_of(p, b, v) + 10.0 * at_rest(p):
             return False
     return True
 
@@ -443,8 +460,10 @@ def solve(p):
     """Solve the equation: fill AT.end and AT.flags, leave the velocity and its wrenches in point POINT.best."""
     flags = doubles(equation.number(p, AT.flags), 2)
     known = flags[0] > 0.0
-    step, last = doubles(equation.number(p, AT.step), 2), equation.of_dofs(p, AT.last)
-    step[1] = step[0] * size(p, equation.of_dofs(p, AT.force))
+    step, last = doubles(equation.number(p, AT.step), 3), equation.of_dofs(p, AT.last)
+    step[1], step[2] = step[0] * size(p, equation.of_dofs(p, AT.force)), V_C
+    for b in range(equation.number(p, AT.nbody)):
+        step[2] = max(step[2], CREEP * speed_of(p, b, equation.of_dofs(p, AT.start)))
     now = equation.point_scores(p, equation.point(p, POINT.now))
     new = equation.point_scores(p, equation.point(p, POINT.new))
     best = equation.point_scores(p, equation.point(p, POINT.best))

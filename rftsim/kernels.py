@@ -14,7 +14,8 @@ import numpy as np
 from numba import carray, njit, types
 
 from rftsim import tables
-from rftsim.choice import FASTMATH, LOOK, ROOM, choosing, columns_on_stack, filled_up, next_run
+from rftsim.choice import LOOK, ROOM, choosing, columns_on_stack, filled_up, next_run
+from rftsim.dense import FASTMATH
 from rftsim.memory import on_stack, peek
 from rftsim.packed import BLOCK, COLUMNS, HEADER
 

@@ -14,8 +14,6 @@ FRAME: Final = 15
 """Numbers that fix a body's frame for a step: up, rise, forward, height, rear (4), drop."""
 RAMP: Final = 100.0
 """Steepness of the leading-edge rule in the implicit force: faces fall out between n.v_hat = 0 and -1/RAMP."""
-V_C: Final = 3e-7
-"""Speed below which a triangle's stress falls to zero in the implicit force [m/s]; bodies at rest creep slower."""
 
 
 @njit(forceinline=True)
@@ -57,38 +55,43 @@ def frame(sand, surface, xpos, xmat, velocity, omega, out):
     kept[9], kept[14] = f.height, f.drop
 
 
-@entry(types.void, *[address] * 5, types.float64, address)
-def ahead(sand, surface, frame, xmat, twist, h, out):
+@entry(types.void, *[address] * 5, types.float64, types.float64, address)
+def ahead(sand, surface, frame, xmat, twist, v_c, h, out):
     """Wrench continuous at rest, world frame: at the present depths, and at those after a time h, (12,)."""
     s, body, r = doubles(sand, packed.SAND_SIZE), surface_at(surface), doubles(xmat, 9)
     f, medium = moving_frame(doubles(frame, FRAME), r, doubles(twist, 6)), _soft_medium(s, body)
     total, reach = doubles(out, 12), _reach(body, f, h)
+    if unpack.lowest_corner(body, f) + reach <= 0.0:
+        for k in range(12):
+            total[k] = 0.0
+        return
     if s[0] == 0.0:
-        g = kernels.ahead_2d(body, f, medium, V_C, h, reach)
+        g = kernels.ahead_2d(body, f, medium, v_c, h, reach)
     elif s[0] == 1.0:
-        g = kernels.ahead_3d(body, f, medium, V_C, h, reach)
+        g = kernels.ahead_3d(body, f, medium, v_c, h, reach)
     else:
-        g = kernels.ahead_3d_quartic(body, f, medium, V_C, h, reach)
+        g = kernels.ahead_3d_quartic(body, f, medium, v_c, h, reach)
     for part in range(0, 12, 3):
         total[part], total[part + 1], total[part + 2] = unpack.to_world(r, g[part], g[part + 1], g[part + 2])
 
 
-@entry(types.void, *[address] * 5, types.float64, address)
-def jacobian(sand, surface, frame, xmat, twist, completed, out):
+@entry(types.void, *[address] * 5, types.float64, types.float64, address)
+def jacobian(sand, surface, frame, xmat, twist, v_c, completed, out):
     """Derivative of `ahead`'s present wrench by the twist, world frame, (6, 6)."""
     s, body, r = doubles(sand, packed.SAND_SIZE), surface_at(surface), doubles(xmat, 9)
     f, medium = moving_frame(doubles(frame, FRAME), r, doubles(twist, 6)), _soft_medium(s, body)
-    local, turned = matrix(room(36), 6, 6), matrix(room(36), 6, 6)
+    local, turned, g = matrix(room(36), 6, 6), matrix(room(36), 6, 6), matrix(out, 6, 6)
     for i in range(6):
         for k in range(6):
-            local[i, k] = 0.0
+            local[i, k] = g[i, k] = 0.0
+    if unpack.lowest_corner(body, f) <= 0.0:
+        return
     if s[0] == 0.0:
-        kernels.jacobian_2d(body, f, medium, V_C, completed, local)
+        kernels.jacobian_2d(body, f, medium, v_c, completed, local)
     elif s[0] == 1.0:
-        kernels.jacobian_3d(body, f, medium, V_C, completed, local)
+        kernels.jacobian_3d(body, f, medium, v_c, completed, local)
     else:
-        kernels.jacobian_3d_quartic(body, f, medium, V_C, completed, local)
-    g = matrix(out, 6, 6)
+        kernels.jacobian_3d_quartic(body, f, medium, v_c, completed, local)
     for half in range(0, 6, 3):  # R G R'
         for k in range(6):
             x, y, z = unpack.to_world(r, local[half, k], local[half + 1, k], local[half + 2, k])

