@@ -9,7 +9,7 @@ import numpy as np
 
 from rftsim.bench import environment, pareto
 from rftsim.bench.kernel import Arithmetic, Cost
-from rftsim.bench.stability import FORCES, Row
+from rftsim.bench.stability import FORCES, Row, with_answer
 from rftsim.demo import Point
 from rftsim.render import render, watching
 from rftsim.run import STEADY, History
@@ -106,21 +106,22 @@ def save_picture(model: mujoco.MjModel, data: mujoco.MjData, body: str, path: Pa
 
 def plot_stability(rows: list[Row], path: Path) -> None:
     """Draw the hard cases' error against the time step and against the time spent."""
-    figure = _figure((11, 5))
+    figure, answered = _figure((11, 5)), with_answer(rows)
     left, right = figure.subplots(1, 2, sharey=True)
-    for force in FORCES:
+    for force in FORCES if answered else ():
         colour = {"implicit": "C0", "explicit": "C3"}[force]
         steps = sorted({h for row in rows for used, h in row.played if used == force})
-        errors = np.array([[row.verdicts[force, h].error for h in steps] for row in rows])
-        costs = np.array([[row.played[force, h].cost for h in steps] for row in rows])
-        errors = np.clip(np.nan_to_num(errors, posinf=LOST), 1e-5, LOST)
+        errors = np.array([[row.verdicts[force, h].error for h in steps] for row in answered])
+        costs = np.array([[row.played[force, h].cost for h in steps] for row in answered])
+        errors = np.clip(errors, 1e-5, LOST)
         left.loglog(1e3 * np.array(steps), errors.T, color=colour, alpha=0.2, linewidth=1)
         left.loglog(1e3 * np.array(steps), np.median(errors, 0), "o-", color=colour, linewidth=2.5, label=force)
         right.loglog(costs.T, errors.T, color=colour, alpha=0.2, linewidth=1)
         middle = np.median(costs, 0), np.median(errors, 0)
         right.loglog(*middle, "o-", color=colour, linewidth=2.5, label=force)
         for h, x, y in zip(steps, *middle, strict=True):
-            right.annotate(f"{1e3 * h:g} ms", (x, y), textcoords="offset points", xytext=(5, 5), color=colour)
+            beside = {"implicit": (-12, -16), "explicit": (0, 8)}[force]
+            right.annotate(f"{1e3 * h:g} ms", (x, y), textcoords="offset points", xytext=beside, color=colour)
     left.set_xlabel("time step [ms]")
     left.set_ylabel("error against the exact or converged answer")
     right.set_xlabel("elapsed time per simulated second [s]")
@@ -128,8 +129,8 @@ def plot_stability(rows: list[Row], path: Path) -> None:
         axis.axhline(LOST, color="0.6", linestyle=":")
         axis.grid(alpha=0.3)
         axis.legend(loc="lower right")
-    left.text(steps[0] * 1e3, LOST, "lost", color="0.4", va="bottom")
-    figure.suptitle(f"{len(rows)} hard cases, and their median (bold)")
+    left.text(0.0, LOST, " lost", color="0.4", va="bottom", transform=left.get_yaxis_transform())
+    figure.suptitle(f"{len(answered)} hard cases, and their median (bold)")
     figure.savefig(path, dpi=110)
 
 

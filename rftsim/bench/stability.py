@@ -47,7 +47,7 @@ class Verdict(NamedTuple):
     """How a played case compares."""
 
     error: float
-    """Largest relative error of what has an exact or converged value."""
+    """Largest relative error of what has an exact or converged value; nan where nothing of that kind is measured."""
     rest: float
     """Largest of what ought to be zero, over its limit; nan where nothing of that kind is measured."""
 
@@ -180,28 +180,35 @@ class Summary(NamedTuple):
     """Mean evaluations per step of the implicit force, by time step [s]."""
     jacobians: dict[float, float]
     error: dict[Force, dict[float, float]]
-    """Median error by force and time step [s]."""
+    """Median error by force and time step [s], of the cases that have an exact or converged answer."""
     cost_ratio: float
     """Median cost of a second simulated at 5 ms with the implicit force, over one at 1 ms with the explicit one; nan
     where these steps were not taken."""
-    nearer: int
-    """Cases of which the former is nearer to the truth."""
+    nearer: tuple[int, int]
+    """Of how many of these cases the former is nearer to the truth, and how many there are."""
+
+
+def with_answer(rows: list[Row]) -> list[Row]:
+    """The cases that have an exact or converged answer."""
+    return [row for row in rows if not any(math.isnan(verdict.error) for verdict in row.verdicts.values())]
 
 
 def summarise(rows: list[Row]) -> Summary:
     """Means and medians over the cases."""
-    steps = sorted({h for row in rows for _, h in row.played})
+    steps, answered = sorted({h for row in rows for _, h in row.played}), with_answer(rows)
     error: dict[Force, dict[float, float]] = {
-        force: {h: statistics.median(row.verdicts[force, h].error for row in rows) for h in steps} for force in FORCES
+        force: {h: statistics.median(row.verdicts[force, h].error for row in answered) for h in steps}
+        for force in FORCES
+        if answered
     }
     ratio, nearer = math.nan, 0
     if {1e-3, 5e-3} <= set(steps):
         ratio = statistics.median(row.played["implicit", 5e-3].cost / row.played["explicit", 1e-3].cost for row in rows)
-        nearer = sum(row.verdicts["implicit", 5e-3].error <= row.verdicts["explicit", 1e-3].error for row in rows)
+        nearer = sum(row.verdicts["implicit", 5e-3].error <= row.verdicts["explicit", 1e-3].error for row in answered)
     return Summary(
         {h: statistics.fmean(row.played["implicit", h].evaluations for row in rows) for h in steps},
         {h: statistics.fmean(row.played["implicit", h].jacobians for row in rows) for h in steps},
         error,
         ratio,
-        nearer,
+        (nearer, len(answered)),
     )

@@ -90,7 +90,7 @@ class Bench:
         console = Console()
         for table in _tables(rows):
             console.print(table)
-        _print_summary(console, summary, len(rows), starts)
+        _print_summary(console, summary, starts)
         if picture is not None:
             console.print(f"wrote {picture}", highlight=False)
 
@@ -214,7 +214,7 @@ def _tables(rows: list[Row]) -> list[Table]:
     ]
 
 
-def _print_summary(console: Console, summary: Summary, cases: int, starts: Starts) -> None:
+def _print_summary(console: Console, summary: Summary, starts: Starts) -> None:
     def listed(values: dict[float, float], scale: float = 1.0) -> str:
         return ", ".join(f"{scale * value:.3g} at {1e3 * h:g} ms" for h, value in values.items())
 
@@ -223,7 +223,7 @@ def _print_summary(console: Console, summary: Summary, cases: int, starts: Start
         f"derivatives per step (each about 3.5 evaluations): {listed(summary.jacobians)}",
         *(f"median error [%], {force}: {listed(error, 100)}" for force, error in summary.error.items()),
         f"a second at 5 ms implicit costs {summary.cost_ratio:.2f} of one at 1 ms explicit in the median, and is "
-        f"nearer to the truth in {summary.nearer} of {cases} cases",
+        f"nearer to the truth in {summary.nearer[0]} of {summary.nearer[1]} cases",
         f"{starts.starts} random starts at 5 ms: {starts.failed} lost, largest work of the sand in a step "
         f"{starts.gain:.2g} J, {starts.evaluations:.2f} evaluations and {starts.jacobians:.2f} derivatives per step, "
         f"{starts.unsolved} unsolved",
@@ -249,7 +249,7 @@ def _report(rows: list[Row], summary: Summary, starts: Starts) -> dict[str, obje
             "jacobians": summary.jacobians,
             "median_error": summary.error,
             "cost_ratio_implicit_5ms_explicit_1ms": summary.cost_ratio,
-            "nearer_of": [summary.nearer, len(rows)],
+            "nearer_of": list(summary.nearer),
         },
         "random_starts": starts._asdict(),
     }

@@ -154,6 +154,43 @@ def test_forward_leaves_no_trace():
     assert np.array_equal(*ends)
 
 
+@pytest.mark.parametrize("speed", [0.0, 1.0])
+def test_a_body_at_rest_creeps_slowly(speed):
+    """A ball that is pushed with half of what the sand bears creeps at v_c / sqrt(3).
+
+    v_c is 3e-7 m/s, and 1e-4 of the speed of another body where one moves.
+    """
+    xml = """
+        <mujoco>
+          <option timestep="0.002"/>
+          <worldbody>
+            <body name="pushed" pos="0 0 -0.1"> <joint type="slide" axis="1 0 0"/> <geom size="0.05"/> </body>
+            <body name="other" pos="0 1 -0.01">
+              <joint name="drawn" type="slide" axis="1 0 0"/> <geom size="0.02" mass="50"/>
+            </body>
+          </worldbody>
+          <actuator> <velocity joint="drawn" kv="1e4"/> </actuator>
+        </mujoco>"""
+    explicit, model = rftsim.load(xml, SAND, force="explicit"), rftsim.load(xml, SAND)
+    dragged, data = mujoco.MjData(explicit), mujoco.MjData(model)
+    dragged.qvel[0] = 1e-2
+    mujoco.mj_forward(explicit, dragged)
+    data.qfrc_applied[0] = -0.5 * dragged.qfrc_passive[0]
+    data.ctrl[0] = data.qvel[1] = speed
+    mujoco.mj_step(model, data, nstep=200)
+    assert data.qvel[1] == pytest.approx(speed, abs=1e-2)
+    assert data.qvel[0] == pytest.approx(max(3e-7, 1e-4 * speed) / np.sqrt(3.0), rel=0.05)
+
+
+def test_medians_are_over_what_has_an_answer(tmp_path):
+    """A case in which nothing has an exact or converged value is no part of a median."""
+    study = stability.Study(tmp_path / "study.json")
+    rows = stability.run(study, ("edge-on, stuck", "heavy sphere"), (1e-3, 5e-3), lambda _: None)
+    summary = stability.summarise(rows)
+    assert summary.error["implicit"] == {h: rows[1].verdicts["implicit", h].error for h in (1e-3, 5e-3)}
+    assert summary.nearer == (1, 1)
+
+
 def test_study_remembers(tmp_path):
     """What was measured is not measured again; another source forgets it."""
     study = stability.Study(tmp_path / "study.json")
