@@ -1,37 +1,73 @@
-"""`rftsim bench environment` and `pareto`: their tables, pictures and JSON."""
+"""`rftsim bench kernel`, `environment` and `pareto`: their tables, pictures and JSON."""
 
 import itertools
 import math
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
 from rftsim.bench import environment as sanded
+from rftsim.bench import kernel as loop
 from rftsim.bench import pareto as tradeoff
 from rftsim.bench.environment import Timed
 from rftsim.bench.pareto import Compared, Tried
 from rftsim.bench.subjects import SUBJECTS
 from rftsim.cli.output import print_json
-from rftsim.files import check_writable, replacing
-from rftsim.plots import plot_environment, plot_pareto
+from rftsim.cli.studies import draw, picture_in, progress, remembered_in, say
+from rftsim.plots import plot_environment, plot_kernel, plot_pareto
 
 ROUNDS = 15
 """Repetitions of each measurement."""
 
 
+def kernel(quick: bool, oracle: Path, plot: Path | None, json: bool) -> None:
+    """Time a triangle by the size of the body."""
+    picture = picture_in(plot, "kernel")
+    sizes = tuple(size for size in loop.SIZES if not quick or size <= 20480)
+    with progress("kernel", loop.ROUNDS + 2, json) as report:
+        limit = loop.arithmetic()
+        report("kernel")
+        single = loop.single_precision()
+        report("kernel")
+        found = loop.measure(sizes, loop.load_oracle(oracle), lambda _: report("kernel"))
+    power = loop.exponent(found)
+    draw(picture, plot_kernel, found, limit)
+    if json:
+        rows = [
+            {
+                "triangles": cost.triangles,
+                "ns": cost.nanoseconds,
+                "numpy_ratio": _number(cost.ratio),
+                "memory": cost.memory,
+                "leading": cost.leading,
+            }
+            for cost in found
+        ]
+        head = {"law": loop.LAW, "sizes": rows, "exponent": power}
+        print_json({**head, "arithmetic": limit._asdict(), "single_precision": single._asdict()})
+        return
+    console = Console()
+    console.print(_kernel_table(found, limit))
+    for line in (
+        f"time grows with the {power:.3f}th power of the triangles from {loop.LINEAR} on; the law's "
+        f"{limit.operations:.0f} operations take {limit.nanoseconds:.2f} ns at least, and are spared the "
+        f"{100 - 100 * found[-1].leading:.0f} % of the triangles that do not lead",
+        f"in single precision the loop takes {single.single_nanoseconds:.2f} ns for each of {single.triangles} "
+        f"triangles instead of {single.double_nanoseconds:.2f}, and its wrench errs by {single.error:.1g}",
+    ):
+        console.print(line, highlight=False, soft_wrap=True)
+    say(console, picture)
+
+
 def environment(quick: bool, plot: Path | None, json: bool) -> None:
     """Time MuJoCo's step with sand and without."""
-    picture = _picture(plot, "environment")
+    picture = picture_in(plot, "environment")
     rounds = 3 if quick else ROUNDS
-    with _progress("environment", sanded.repetitions(rounds), json) as report:
+    with progress("environment", sanded.repetitions(rounds), json) as report:
         rows = sanded.measure(rounds, report)
-    _finish(rows, picture, plot_environment)
+    draw(picture, plot_environment, rows)
     if json:
         print_json([row._asdict() for row in rows])
         return
@@ -44,20 +80,17 @@ def environment(quick: bool, plot: Path | None, json: bool) -> None:
         highlight=False,
         soft_wrap=True,
     )
-    _say(console, picture)
+    say(console, picture)
 
 
 def pareto(quick: bool, memory: Path, plot: Path | None, json: bool) -> None:
     """Compare laws, triangles and time steps."""
-    picture = _picture(plot, "pareto")
-    memory.mkdir(parents=True, exist_ok=True)
-    kept = memory / "pareto.json"
-    check_writable(kept)
-    study = tradeoff.Study(kept, quick)
-    with _progress("pareto", sum(len(study.laws(name)) for name in SUBJECTS), json) as report:
+    picture = picture_in(plot, "pareto")
+    study = tradeoff.Study(remembered_in(memory, "pareto"), quick)
+    with progress("pareto", sum(len(study.laws(name)) for name in SUBJECTS), json) as report:
         compared = tradeoff.run(study, SUBJECTS, report)
     apart = tradeoff.apart(compared)
-    _finish(compared, picture, plot_pareto)
+    draw(picture, plot_pareto, compared)
     if json:
         print_json(
             {
@@ -81,11 +114,31 @@ def pareto(quick: bool, memory: Path, plot: Path | None, json: bool) -> None:
         if value > 0.0:
             says = f"{name}: the path under {law} lies {_percent(value)} % from that under {SUBJECTS[name].laws[0]}"
             console.print(says, highlight=False, soft_wrap=True)
-    _say(console, picture)
+    say(console, picture)
 
 
 def _front(compared: list[Compared]) -> list[Tried]:
     return [one for each in compared for one in tradeoff.fronts(each.tried)]
+
+
+def _kernel_table(costs: list[loop.Cost], limit: loop.Arithmetic) -> Table:
+    table = Table()
+    for heading in ("triangles", "body [µs]", "each [ns]", "of the limit", "NumPy's time", "memory"):
+        table.add_column(escape(heading), justify="right")
+    for cost in costs:
+        table.add_row(
+            f"{cost.triangles}",
+            f"{1e6 * cost.seconds:.3g}",
+            f"{cost.nanoseconds:.2f}",
+            f"{100 * limit.nanoseconds / cost.nanoseconds:.0f} %",
+            "-" if math.isnan(cost.ratio) else f"× {cost.ratio:.0f}",
+            f"× {cost.memory:.2f}",
+        )
+    return table
+
+
+def _number(value: float) -> float | None:
+    return None if math.isnan(value) else value
 
 
 def _single_table(rows: list[Timed]) -> Table:
@@ -159,31 +212,3 @@ def _front_table(front: list[Tried]) -> Table:
 
 def _percent(value: float) -> str:
     return "lost" if math.isinf(value) else f"{100 * value:.2g}"
-
-
-def _picture(plot: Path | None, name: str) -> Path | None:
-    if plot is None:
-        return None
-    plot.mkdir(parents=True, exist_ok=True)
-    check_writable(plot / f"{name}.png")
-    return plot / f"{name}.png"
-
-
-def _finish(found: Any, picture: Path | None, draw: Callable[[Any, Path], None]) -> None:
-    if picture is not None:
-        with replacing(picture) as temporary:
-            draw(found, temporary)
-
-
-def _say(console: Console, picture: Path | None) -> None:
-    if picture is not None:
-        console.print(f"wrote {picture}", highlight=False)
-
-
-@contextmanager
-def _progress(name: str, total: int, hidden: bool) -> Iterator[Callable[[str], None]]:
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
-    console = Console(stderr=True)
-    with Progress(*columns, TimeElapsedColumn(), TimeRemainingColumn(), console=console, disable=hidden) as bar:
-        task = bar.add_task(name, total=total)
-        yield lambda said: bar.update(task, advance=1, description=said)
