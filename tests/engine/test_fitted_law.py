@@ -75,16 +75,12 @@ def test_source_table_from_a_file_is_the_built_in_law(tmp_path, law, force):
 
 
 def test_model_needs_no_file_afterwards(file, tmp_path):
-    """Copies, pickles, MJB and the saved XML run as the model does when the file is gone.
-
-    XML keeps six digits; the last of them turns up to the solver's tolerance (0.3 % of the speed) on impact.
-    """
+    """Copies, pickles and MJB run as the model does when the file is gone."""
     spec = spec_of(BALL)
     rftsim.add_sand(spec, str(file), f"rft3d:{file}")
     model = spec.compile()
     expected = fallen(model)
     mujoco.mj_saveModel(model, str(tmp_path / "model.mjb"))
-    xml = spec.to_xml()
     file.unlink()
     for clone in (
         copy.copy(model),
@@ -92,8 +88,19 @@ def test_model_needs_no_file_afterwards(file, tmp_path):
         mujoco.MjModel.from_binary_path(str(tmp_path / "model.mjb")),
     ):
         np.testing.assert_array_equal(fallen(clone), expected)
-    np.testing.assert_allclose(fallen(mujoco.MjModel.from_xml_string(xml)), expected, rtol=3e-3, atol=1e-4)
     assert np.abs(expected - fallen(sandy(sand=rftsim.Sand(xi_n=2e5, mu_surf=0.3), force="implicit"))).max() > 1e-4
+
+
+def test_saved_xml_needs_no_file_afterwards(file, request):
+    """The saved XML, of six digits, runs as the model does when the file is gone."""
+    if "quartic" in request.node.name:
+        reason = "the solver's tolerance, 0.3 % of the speed, makes 4.7e-5 of turn of the last digit on impact"
+        request.applymarker(pytest.mark.xfail(reason=reason, raises=AssertionError))
+    spec = spec_of(BALL)
+    rftsim.add_sand(spec, str(file), f"rft3d:{file}")
+    expected, xml = fallen(spec.compile()), spec.to_xml()
+    file.unlink()
+    np.testing.assert_allclose(fallen(mujoco.MjModel.from_xml_string(xml)), expected, rtol=1e-3, atol=1e-5)
 
 
 def test_one_file_is_law_and_sand(file):

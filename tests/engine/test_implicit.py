@@ -221,12 +221,22 @@ def test_hard_case(case, h):
     assert played.evaluations < 6.0
 
 
+@pytest.fixture(scope="module")
+def starts():
+    return stability.random_starts(1000)
+
+
 @pytest.mark.slow
-def test_a_thousand_random_starts():
+def test_a_thousand_random_starts(starts):
     """None is lost, and the sand's work in a step is at most `GAIN` of twice the kinetic energy, some joules."""
-    starts = stability.random_starts(1000)
     assert starts.failed == 0
     assert starts.gain < 5.0 * GAIN
+
+
+@pytest.mark.slow
+@pytest.mark.xfail(reason="1.0e-7 J in one step: the stepping lets rounding do 1e-7 of twice the kinetic energy")
+def test_no_random_start_gains_a_nanojoule(starts):
+    assert starts.gain < 1e-9
 
 
 @pytest.mark.slow
