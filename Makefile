@@ -27,7 +27,7 @@ readme: $(VENV)/ready
 
 # The machine code that ships, after an edit of what is compiled.
 native: $(VENV)/ready
-	$(BIN)/python -P rftsim/native_build.py
+	$(BIN)/python -P rftsim/machine/build.py
 
 test-slow: $(VENV)/ready
 	$(BIN)/pytest -m slow

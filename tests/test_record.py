@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 import rftsim
-from rftsim import record
+from rftsim.view import record
 
 rerun_chunk = pytest.importorskip("rerun.chunk")
 

@@ -6,9 +6,9 @@ from typing import Final, NamedTuple
 import mujoco
 import numpy as np
 
-from rftsim.packed import SAND_FIELDS, STRENGTHS
-from rftsim.readout import instances
-from rftsim.scene import add_sand
+from rftsim.law.layout import SAND_FIELDS, STRENGTHS
+from rftsim.model.add_sand import add_sand
+from rftsim.model.readout import instances
 from rftsim_envs.physics import Array, Physics
 from rftsim_envs.task import Config, Task
 

@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 from rftsim_models.wheels import GROUSER_WHEEL, WHEEL, build_wheel
 
-from rftsim.surface import Wheel
+from rftsim.surface.triangles import Wheel
 from rftsim_envs.physics import Array
 from rftsim_envs.recipe import Training
 from rftsim_envs.task import Config, ConfigError, Moment, Task

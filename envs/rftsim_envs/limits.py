@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from rftsim.packed import SAND_FIELDS
-from rftsim.readout import instances
-from rftsim.validity import DEPTH_LIMIT, FROUDE_LIMIT
+from rftsim.law.layout import SAND_FIELDS
+from rftsim.model.readout import instances
+from rftsim.run.validity import DEPTH_LIMIT, FROUDE_LIMIT
 from rftsim_envs.physics import Physics
 from rftsim_envs.task import cross
 

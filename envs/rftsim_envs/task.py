@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from rftsim.errors import RftsimError
-from rftsim.sand import make_sand
+from rftsim.sand.presets import make_sand
 from rftsim_envs.physics import Array, Flags
 from rftsim_envs.recipe import Drive, Training
 

@@ -7,7 +7,7 @@ from typing import Any, Final, Self
 
 import numpy as np
 
-from rftsim.record import Recorder
+from rftsim.view.record import Recorder
 from rftsim_envs.episodes import Episodes
 
 GROUPS: Final = {"speed": "motion", "command": "motion", "slip": "slip", "power": "power"}

@@ -12,9 +12,9 @@ import numpy as np
 from mujoco.batch import Batch
 
 from rftsim.bench.subjects import SUBJECTS, in_motion, put
-from rftsim.packed import SAND_FIELDS
-from rftsim.readout import instances, work
-from rftsim.surface import Array
+from rftsim.law.layout import SAND_FIELDS
+from rftsim.model.readout import instances, work
+from rftsim.surface.triangles import Array
 
 Sand = Literal["none", "explicit", "implicit"]
 Works = dict[Sand, Callable[[], float]]

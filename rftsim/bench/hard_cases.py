@@ -13,8 +13,9 @@ import mujoco
 import numpy as np
 from rftsim_models.wheels import WheelParameters, build_wheel
 
-from rftsim.sand import FreeSurface, Sand
-from rftsim.scene import add_sand
+from rftsim.model.add_sand import add_sand
+from rftsim.sand.free_surface import FreeSurface
+from rftsim.sand.medium import Sand
 
 SAND: Final = Sand(rho_c=3000.0, mu_int=0.4, mu_surf=0.4, xi_n=0.92e6)
 RESTING: Final = 10.0

@@ -13,12 +13,13 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from rftsim import solids
-from rftsim.economy import middle
-from rftsim.laws import get_law
-from rftsim.packed import BLOCK, COLUMNS, pack_sand, pack_surface
-from rftsim.sand import FreeSurface, Sand
-from rftsim.surface import Array, Surface
+from rftsim.law.laws import get_law
+from rftsim.law.layout import BLOCK, COLUMNS, pack_sand, pack_surface
+from rftsim.reduction.reduce import middle
+from rftsim.sand.free_surface import FreeSurface
+from rftsim.sand.medium import Sand
+from rftsim.surface import solids
+from rftsim.surface.triangles import Array, Surface
 
 if TYPE_CHECKING:
     from rftsim.bench.single import Single

@@ -2,17 +2,18 @@
 
 import numba  # not `from`: what measures the package is not part of what its machine code is made from
 
-from rftsim import kernels, machine_code, native_law, unpack
-from rftsim.dense import FASTMATH
+from rftsim.law import exports, kernels, kinematics
+from rftsim.machine import link
+from rftsim.solver.linear_algebra import FASTMATH
 
-machine_code.load("law")("rftsim_wrench")  # by which name compiled code finds it from here on
+link.load("law")("rftsim_wrench")  # by which name compiled code finds it from here on
 
 
 @numba.njit
 def evaluate(sand, body, position, turn, velocity, omega, out, count):
     """The wrench on a body, so many times."""
     for _ in range(count):
-        native_law.wrench(
+        exports.wrench(
             sand.ctypes.data,
             body.ctypes.data,
             position.ctypes.data,
@@ -26,7 +27,7 @@ def evaluate(sand, body, position, turn, velocity, omega, out, count):
 @numba.njit(fastmath=FASTMATH, error_model="numpy")
 def sums(sand, body, position, turn, velocity, omega):
     """The law's loop alone, whose instructions are counted."""
-    frame, medium = unpack.frame_of(sand, body, position, turn, velocity, omega), unpack.medium_of(sand, body)
+    frame, medium = kinematics.frame_of(sand, body, position, turn, velocity, omega), kinematics.medium_of(sand, body)
     return kernels.sums_3d(body, frame, medium)
 
 

@@ -14,15 +14,15 @@ from typing import Any, Final, Literal, NamedTuple
 import mujoco
 import numpy as np
 
-from rftsim import economy
 from rftsim.bench import subjects
 from rftsim.bench.subjects import SUBJECTS, Subject
-from rftsim.compiled import SOURCE
-from rftsim.kept import Kept
-from rftsim.reach import sampled_reach
-from rftsim.readout import instances
-from rftsim.scenes import Staged
-from rftsim.surface import Array
+from rftsim.files import Kept
+from rftsim.machine.sources import SOURCE
+from rftsim.model.reach import sampled_reach
+from rftsim.model.readout import instances
+from rftsim.reduction import reduce
+from rftsim.run.scenes import Staged
+from rftsim.surface.triangles import Array
 
 STEPS: Final = (5e-4, 1e-3, 2e-3, 5e-3, 1e-2)
 """[s]."""
@@ -51,7 +51,7 @@ class Tried(NamedTuple):
     elements: int
     """Triangles or facets, of all bodies."""
     wrench_error: float
-    """Largest over poses and motions, see `economy.errors`."""
+    """Largest over poses and motions, see `reduce.errors`."""
     force: Force
     h: float
     """Time step [s]."""
@@ -83,7 +83,7 @@ class Study:
     """
 
     def __init__(self, path: Path, quick: bool) -> None:
-        own = b"".join(Path(str(module.__file__)).read_bytes() for module in (subjects, economy))
+        own = b"".join(Path(str(module.__file__)).read_bytes() for module in (subjects, reduce))
         self.kept = Kept(path, SOURCE + own + Path(__file__).read_bytes() + mujoco.__version__.encode())
         self.quick = quick
 
@@ -193,7 +193,7 @@ def _wrench_error(fine: Staged, staged: Staged) -> float:
     found = []
     for name, surface in fine.bed.surfaces.items():
         reach = sampled_reach(fine.model, fine.model.body(name).id, surface, SEED)
-        samples = economy.draw(surface, bed.sand, reach, economy.DEPTHS, SEED)
-        whole, reduced = (economy.wrenches(s, bed.sand, samples) for s in (surface, staged.bed.surfaces[name]))
-        found.append(economy.errors(whole, reduced, samples.depth).max())
+        samples = reduce.draw(surface, bed.sand, reach, reduce.DEPTHS, SEED)
+        whole, reduced = (reduce.wrenches(s, bed.sand, samples) for s in (surface, staged.bed.surfaces[name]))
+        found.append(reduce.errors(whole, reduced, samples.depth).max())
     return float(max(found))

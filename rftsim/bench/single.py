@@ -10,8 +10,8 @@ from typing import Any, Final, NamedTuple
 import numba  # not `from`: what measures the package is not part of what its machine code is made from
 import numpy as np
 
-from rftsim import choice, kernels, unpack
-from rftsim.surface import Array
+from rftsim.law import kernels, kinematics, selection
+from rftsim.surface.triangles import Array
 
 LARGEST: Final = 1e30
 """Constants that single precision cannot hold are taken for this, or one over it."""
@@ -39,7 +39,7 @@ def measure(
         motion: Position, rotation, velocity and angular velocity.
         least: Times pieces of work in turn, see `kernel`.
     """
-    frame, medium = unpack.frame_of(sand, body, *motion), unpack.medium_of(sand, body)
+    frame, medium = kinematics.frame_of(sand, body, *motion), kinematics.medium_of(sand, body)
     works: list[Callable[[int], Any]] = []
     out = []
     for loop, number in ((kernels.sums_3d, np.float64), (_single(), np.float32)):
@@ -72,7 +72,7 @@ def _as(number: Any, value: Any) -> Any:
 
 def _single() -> Any:
     """`kernels.sums_3d` in single precision."""
-    chosen = _rewritten(choice.__file__, {})
+    chosen = _rewritten(selection.__file__, {})
     return _rewritten(kernels.__file__, chosen)["sums_3d"]
 
 
@@ -83,7 +83,7 @@ def _rewritten(path: "str | None", given: dict[str, Any]) -> dict[str, Any]:
     module.__dict__.update({"_single": np.float32, **given})
     if given:
         tree.body = [
-            line for line in tree.body if not (isinstance(line, ast.ImportFrom) and line.module == choice.__name__)
+            line for line in tree.body if not (isinstance(line, ast.ImportFrom) and line.module == selection.__name__)
         ]
     exec(compile(ast.fix_missing_locations(tree), str(path), "exec"), module.__dict__)
     return module.__dict__

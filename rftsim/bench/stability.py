@@ -11,9 +11,9 @@ import numpy as np
 
 from rftsim.bench import hard_cases
 from rftsim.bench.hard_cases import CASES, Force
-from rftsim.compiled import SOURCE
-from rftsim.kept import Kept
-from rftsim.readout import work
+from rftsim.files import Kept
+from rftsim.machine.sources import SOURCE
+from rftsim.model.readout import work
 
 STEPS: Final = (1e-4, 1e-3, 2e-3, 5e-3, 1e-2)
 """[s]."""

@@ -11,8 +11,8 @@ import numpy as np
 from rftsim_models import parts
 from rftsim_models.hexapod import LEGS, TRIPODS, build_hexapod
 
-from rftsim.scene import add_sand
-from rftsim.scenes import POPPY, SCENES, Measured, Staged, stage
+from rftsim.model.add_sand import add_sand
+from rftsim.run.scenes import POPPY, SCENES, Measured, Staged, stage
 
 GAIT: Final = 10.0
 """Rate of the hexapod's legs [rad/s]."""

@@ -16,7 +16,7 @@ from rftsim.bench.pareto import Compared, Tried
 from rftsim.bench.subjects import SUBJECTS
 from rftsim.cli.output import print_json
 from rftsim.cli.studies import draw, picture_in, progress, remembered_in, say
-from rftsim.plots import plot_environment, plot_kernel, plot_pareto
+from rftsim.view.plots import plot_environment, plot_kernel, plot_pareto
 
 ROUNDS = 15
 """Repetitions of each measurement."""

@@ -10,12 +10,12 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from rftsim.cli.output import print_json
-from rftsim.demo import LAWS, RATES, Point, measure_all, points
 from rftsim.errors import RftsimError
 from rftsim.files import check_writable, replacing
-from rftsim.plots import plot_demo
-from rftsim.run import run
-from rftsim.scenes import stage
+from rftsim.run.rates import LAWS, RATES, Point, measure_all, points
+from rftsim.run.run import run
+from rftsim.run.scenes import stage
+from rftsim.view.plots import plot_demo
 
 
 @dataclasses.dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Demo:
         with replacing(plot) as temporary:
             plot_demo(found, temporary)
         staged = stage("grouser-wheel", settings={"rpm": "60"}, duration=2.0)
-        from rftsim.record import Recorder  # rerun is an extra
+        from rftsim.view.record import Recorder  # rerun is an extra
 
         with Recorder(staged.model, recording) as recorder:
             run(staged, recorder.log)

@@ -84,7 +84,7 @@ class Evaluate:
         }
         names = {group: _name(plans[group], group, len(own)) for group, own in runs.items()}
         if self.plot:
-            from rftsim.plots import plot_returns
+            from rftsim.view.plots import plot_returns
 
             with replacing(self.plot) as temporary:
                 plot_returns({names[group]: own for group, own in scores.items()}, temporary)

@@ -19,8 +19,10 @@ from rftsim.fit.generic import Settings
 from rftsim.fit.pictures import plot_map, plot_trial
 from rftsim.fit.plates import Campaign, Plates, read_campaign, read_csv
 from rftsim.fit.report import FOLDS, Report, report
-from rftsim.law_file import law_text, toml
-from rftsim.sand import ALPHA_Z_PLATE, Sand, make_sand, read_parameters, xi_n_from_table
+from rftsim.law.law_file import law_text, toml
+from rftsim.sand.medium import ALPHA_Z_PLATE, Sand
+from rftsim.sand.presets import make_sand, read_parameters
+from rftsim.sand.strength import xi_n_from_table
 
 
 @dataclasses.dataclass(frozen=True)

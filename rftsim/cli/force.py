@@ -8,9 +8,9 @@ import tyro
 from rich.console import Console
 
 from rftsim.cli.output import print_json
-from rftsim.rigid import surface_force
-from rftsim.sand import make_sand
-from rftsim.surface import load_surface
+from rftsim.law.rigid import surface_force
+from rftsim.sand.presets import make_sand
+from rftsim.surface.triangles import load_surface
 
 Vector = tuple[float, float, float]
 

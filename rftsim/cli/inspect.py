@@ -9,11 +9,11 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from rftsim.advice import advise
 from rftsim.cli.output import print_json
 from rftsim.errors import RftsimError
-from rftsim.scene import Bed
-from rftsim.scenes import Staged, stage
+from rftsim.model.add_sand import Bed
+from rftsim.run.advice import advise
+from rftsim.run.scenes import Staged, stage
 
 Settings = Annotated[tuple[tuple[str, ...], ...], tyro.conf.UseAppendAction]
 

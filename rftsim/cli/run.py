@@ -15,10 +15,10 @@ from rich.progress import Progress
 from rftsim.cli.inspect import Settings, settings
 from rftsim.cli.output import print_json
 from rftsim.files import check_writable, replacing
-from rftsim.plots import plot_history, save_picture
-from rftsim.run import SAMPLES, run
-from rftsim.run import Run as Finished
-from rftsim.scenes import Staged, stage
+from rftsim.run.run import SAMPLES, run
+from rftsim.run.run import Run as Finished
+from rftsim.run.scenes import Staged, stage
+from rftsim.view.plots import plot_history, save_picture
 
 
 @dataclasses.dataclass(frozen=True)
@@ -119,7 +119,7 @@ class Run:
             with contextlib.ExitStack() as stack:
                 recorder = None
                 if self.record is not None:
-                    from rftsim.record import Recorder  # rerun is an extra
+                    from rftsim.view.record import Recorder  # rerun is an extra
 
                     recorder = stack.enter_context(Recorder(staged.model, self.record))
 

@@ -12,7 +12,7 @@ from rftsim.bench.stability import FORCES, STEPS, Row, Starts, Study, Summary, r
 from rftsim.cli.output import print_json
 from rftsim.cli.studies import draw, picture_in, progress, remembered_in, say
 from rftsim.errors import RftsimError
-from rftsim.plots import plot_stability
+from rftsim.view.plots import plot_stability
 
 
 def stability(cases: tuple[str, ...], starts: int, quick: bool, memory: Path, plot: Path | None, json: bool) -> None:

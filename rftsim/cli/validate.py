@@ -16,9 +16,9 @@ from rich.table import Table
 from rftsim.cli.output import print_json
 from rftsim.errors import RftsimError
 from rftsim.files import check_writable, replacing
-from rftsim.plots import plot_study
 from rftsim.validation.measured import DATA
 from rftsim.validation.study import Request, Row
+from rftsim.view.plots import plot_study
 
 if TYPE_CHECKING:
     from rftsim.validation.studies import Found

@@ -11,7 +11,7 @@ after the step under way]. What must last is MuJoCo's `plugin_state`, and is bro
 import ctypes
 from typing import Final
 
-from rftsim import registry
+from rftsim.machine import registry
 
 CHUNK: Final = 500
 """Numbers of one numeric: MuJoCo's XML reader takes no more. A surface goes on in the numerics behind its first."""

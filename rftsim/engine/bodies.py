@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 from numba import njit
 
-from rftsim.memory import doubles, int32s, pointer
+from rftsim.machine.memory import doubles, int32s, pointer
 
 
 class Tree(NamedTuple):

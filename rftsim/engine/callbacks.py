@@ -4,13 +4,13 @@ from typing import Final
 
 from numba import njit, types
 
-from rftsim import claims
 from rftsim.engine import explicit, implicit, instance, offsets
 from rftsim.engine.block import HEAD, SIZE, WRENCH
 from rftsim.engine.layout import CONSTANTS
-from rftsim.entries import address, entry
-from rftsim.memory import doubles, int32s, pointer
-from rftsim.registry import SIZE as ENTRIES
+from rftsim.machine import claims
+from rftsim.machine.exports import address, entry
+from rftsim.machine.memory import doubles, int32s, pointer
+from rftsim.machine.registry import SIZE as ENTRIES
 
 _RK4: Final = CONSTANTS["rk4"]
 _PASSIVE: Final = CONSTANTS["passive"]

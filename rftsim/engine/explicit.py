@@ -2,9 +2,9 @@
 
 from numba import njit
 
-from rftsim import native_law
 from rftsim.engine import block, bodies, instance
-from rftsim.memory import doubles, pointer, room
+from rftsim.law import exports
+from rftsim.machine.memory import doubles, pointer, room
 
 
 @njit(forceinline=True)
@@ -24,7 +24,7 @@ def press(model, data, m, d, number):
         r = t.xmat[9 * body : 9 * body + 9].ctypes.data
         f = wrenches[block.WRENCH * k : block.WRENCH * (k + 1)]
         own = sand.ctypes.data, surface.ctypes.data, x.ctypes.data, r, v.ctypes.data, w.ctypes.data, f.ctypes.data
-        native_law.wrench(*own)
+        exports.wrench(*own)
         bodies.add_wrench(t, body, x, (f[0], f[1], f[2]), (f[3], f[4], f[5]), force)
     counted = instance.counters(address)
     counted[0], counted[1], counted[2] = 1.0, 0.0, 0.0

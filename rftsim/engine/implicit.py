@@ -8,11 +8,12 @@ from typing import Final
 
 from numba import njit
 
-from rftsim import dense, equation, native_ahead, native_step
 from rftsim.engine import block, bodies, external, instance
 from rftsim.engine.layout import CONSTANTS
-from rftsim.equation import AT, ENTRIES, KIND, VECTOR
-from rftsim.memory import doubles, int32s, int64s, pointer, release, room, take
+from rftsim.law import exports_ahead
+from rftsim.machine.memory import doubles, int32s, int64s, pointer, release, room, take
+from rftsim.solver import equation, linear_algebra, native_step
+from rftsim.solver.equation import AT, ENTRIES, KIND, VECTOR
 
 _UNDAMPED: Final = CONSTANTS["no_euler_damping"] | CONSTANTS["no_damping"]
 _EULER: Final = CONSTANTS["euler"]
@@ -115,8 +116,8 @@ def _fill_rows(model, data, contact, m, d, p, dragged):
     kind, bound = int64s(equation.number(p, AT.row_kind), n), equation.of_rows(p, AT.row_bound)
     damping, spring = equation.of_rows(p, AT.row_damping), equation.of_rows(p, AT.row_spring)
     kinds, owner = int32s(pointer(d + data.efc_type), n), int32s(pointer(d + data.efc_id), n)
-    dense.copy(doubles(pointer(d + data.efc_D), n), equation.of_rows(p, AT.first_stiffness))
-    dense.copy(doubles(pointer(d + data.efc_aref), n), equation.of_rows(p, AT.first_reference))
+    linear_algebra.copy(doubles(pointer(d + data.efc_D), n), equation.of_rows(p, AT.first_stiffness))
+    linear_algebra.copy(doubles(pointer(d + data.efc_aref), n), equation.of_rows(p, AT.first_reference))
     loss, kbip = doubles(pointer(d + data.efc_frictionloss), n), doubles(pointer(d + data.efc_KBIP), 4 * n)
     jacobian = equation.rows_by_dofs(p, AT.row_jacobian)
     if external.is_sparse(m):
@@ -156,13 +157,13 @@ def _fill_rows(model, data, contact, m, d, p, dragged):
                 seen[i, k] = 0.0
         return
     lu, order = equation.square(p, AT.mass_factors), equation.order(p, AT.mass_order)
-    dense.factor_of(equation.square(p, AT.plain_mass), lu, order)
+    linear_algebra.factor_of(equation.square(p, AT.plain_mass), lu, order)
     solved, drag = equation.vector(p, VECTOR.change), equation.square(p, AT.drag)
     for i in range(n):
-        dense.substitute(lu, order, jacobian[i], solved)
+        linear_algebra.substitute(lu, order, jacobian[i], solved)
         for k in range(nv):
             seen[i, k] = 0.0
-        dense.add_transposed(drag, solved, 1.0, seen[i])
+        linear_algebra.add_transposed(drag, solved, 1.0, seen[i])
 
 
 @njit(forceinline=True)
@@ -183,10 +184,10 @@ def _fill_bodies(model, m, t, table, p):
         lengths[k] = doubles(surfaces[k], 16)[15]
         bodies.jacobian(t, body, equation.body_jacobian(p, k))
         r, f = equation.body_rotation(p, k), equation.body_frame(p, k)
-        dense.copy(t.xmat[9 * body : 9 * body + 9], r)
+        linear_algebra.copy(t.xmat[9 * body : 9 * body + 9], r)
         bodies.twist(t, body, v, w)
         x = t.xpos[3 * body : 3 * body + 3].ctypes.data
-        native_ahead.frame(sand, surfaces[k], x, r.ctypes.data, v.ctypes.data, w.ctypes.data, f.ctypes.data)
+        exports_ahead.frame(sand, surfaces[k], x, r.ctypes.data, v.ctypes.data, w.ctypes.data, f.ctypes.data)
 
 
 @njit(forceinline=True)
@@ -208,7 +209,7 @@ def press(model, data, contact, m, d, number):
     equation.lay_out(p, memory, nbody, nv, rows, old.size)
     entries[AT.old], entries[AT.new] = old.ctypes.data, new.ctypes.data
     entries[AT.counts] = counted.ctypes.data
-    dense.copy(doubles(pointer(d + data.qvel), nv), equation.of_dofs(p, AT.velocity))
+    linear_algebra.copy(doubles(pointer(d + data.qvel), nv), equation.of_dofs(p, AT.velocity))
     doubles(entries[AT.timestep], 1)[0] = doubles(m + model.opt_timestep, 1)[0]
     t = bodies.tree(model, data, m, d)
     _fill_bodies(model, m, t, table, p)
@@ -223,5 +224,5 @@ def press(model, data, contact, m, d, number):
         q = equation.of_dofs(p, AT.out)
         for i in range(nv):
             force[i] += q[i]
-        dense.copy(doubles(entries[AT.wrench], wrenches.size), wrenches)
+        linear_algebra.copy(doubles(entries[AT.wrench], wrenches.size), wrenches)
     release(memory)

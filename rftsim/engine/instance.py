@@ -2,10 +2,11 @@
 
 from numba import njit
 
-from rftsim import claims, state
 from rftsim.engine.block import BODY_MARKER, COUNTERS, HEAD, SAND_MARKER, SIZE, WRENCH
-from rftsim.memory import characters, doubles, int32s, int64s, pointer
-from rftsim.packed import SAND_SIZE
+from rftsim.law.layout import SAND_SIZE
+from rftsim.machine import claims
+from rftsim.machine.memory import characters, doubles, int32s, int64s, pointer
+from rftsim.solver import state
 
 _BODY_MARKER, _SAND_MARKER = BODY_MARKER.encode(), SAND_MARKER.encode()
 

@@ -5,7 +5,7 @@ from typing import Final
 from numba import njit, types
 
 from rftsim.engine.layout import SYMBOL, Contact, Data, Model
-from rftsim.memory import named_address, tuples
+from rftsim.machine.memory import named_address, tuples
 
 _MODEL: Final = len(Model._fields)
 _DATA: Final = len(Data._fields)

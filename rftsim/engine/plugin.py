@@ -10,8 +10,8 @@ from typing import Any, Final
 
 import mujoco
 
-from rftsim import machine_code
 from rftsim.engine import layout
+from rftsim.machine import link
 
 EXPLICIT: Final = "rftsim.sand"
 IMPLICIT: Final = "rftsim.sand.implicit"
@@ -58,8 +58,8 @@ def register(name: str) -> int:
     if memory.raw[:size].strip(b"\0") or memory.raw[size : size + 8] != b"\xff" * 8:
         raise layout.LayoutError(f"MuJoCo {mujoco.__version__} has another mjpPlugin; rftsim needs mujoco>=3.17,<4")
     layout.publish()
-    machine_code.load("law")  # which the engine calls by name
-    address = machine_code.load("engine", layout.GIVEN)
+    link.load("law")  # which the engine calls by name
+    address = link.load("engine", layout.GIVEN)
     plugin = _Plugin.from_buffer(memory)
     plugin.name = name.encode()
     bits = mujoco.mjtPluginCapabilityBit

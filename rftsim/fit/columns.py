@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rftsim.errors import RftsimError
-from rftsim.surface import Array
+from rftsim.surface.triangles import Array
 
 
 class Columns(NamedTuple):

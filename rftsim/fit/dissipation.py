@@ -15,7 +15,7 @@ import numpy as np
 
 from rftsim.errors import RftsimError
 from rftsim.fit.polynomials import terms
-from rftsim.surface import Array
+from rftsim.surface.triangles import Array
 
 GRID_DEG: Final = 5.0
 """Step of the grid of angles on which the constraint is looked at [deg]; between its points, maxima are followed."""

@@ -5,7 +5,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from rftsim.errors import RftsimError
-from rftsim.surface import Array
+from rftsim.surface.triangles import Array
 
 CONFIDENCE: Final = 0.95
 DRAWS: Final = 2000

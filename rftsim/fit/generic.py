@@ -18,9 +18,9 @@ from rftsim.errors import RftsimError
 from rftsim.fit.dissipation import dissipative
 from rftsim.fit.plates import Faces, Plates, leading_faces
 from rftsim.fit.polynomials import terms
-from rftsim.sand import ALPHA_Z_PLATE
-from rftsim.surface import EDGE_ON_DOUBLE, Array
-from rftsim.tables import TABLE_C3, TABLE_C4, Term, columns, monomials
+from rftsim.law.tables import TABLE_C3, TABLE_C4, Term, columns, monomials
+from rftsim.sand.medium import ALPHA_Z_PLATE
+from rftsim.surface.triangles import EDGE_ON_DOUBLE, Array
 
 SOURCE: Final = {3: TABLE_C3, 4: TABLE_C4}
 """The source's tables by degree."""

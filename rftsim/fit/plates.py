@@ -14,7 +14,7 @@ import numpy as np
 
 from rftsim.errors import RftsimError
 from rftsim.fit.columns import read_columns
-from rftsim.surface import EDGE_ON_DOUBLE, Array, Surface
+from rftsim.surface.triangles import EDGE_ON_DOUBLE, Array, Surface
 
 ANGLES: Final = ("beta", "gamma", "psi")
 ALPHA: Final = ("alpha_x", "alpha_y", "alpha_z")

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from rftsim.surface import Array
-from rftsim.tables import monomials
+from rftsim.law.tables import monomials
+from rftsim.surface.triangles import Array
 
 
 def terms(x: Array, degree: int) -> Array:

@@ -8,11 +8,11 @@ import numpy as np
 from rftsim.fit.dissipation import FINE_DEG, largest_power
 from rftsim.fit.generic import SOURCE, Generic, Settings, coefficients, determined, fit, nearest
 from rftsim.fit.plates import Plates, at_unit_depth, directions, leading_faces
-from rftsim.laws import fitted_law
-from rftsim.rigid import surface_force
-from rftsim.sand import Sand
-from rftsim.surface import EDGE_ON_DOUBLE, Array
-from rftsim.tables import Term
+from rftsim.law.laws import fitted_law
+from rftsim.law.rigid import surface_force
+from rftsim.law.tables import Term
+from rftsim.sand.medium import Sand
+from rftsim.surface.triangles import EDGE_ON_DOUBLE, Array
 
 FOLDS: Final = 10
 """Parts of the plates that are held back, one after another."""

@@ -10,9 +10,9 @@ from rftsim.errors import RftsimError
 from rftsim.fit.columns import read_columns
 from rftsim.fit.estimate import Estimate, estimate
 from rftsim.fit.plates import at_unit_depth
-from rftsim.rigid import surface_force
-from rftsim.sand import ALPHA_Z_PLATE, Sand
-from rftsim.surface import Array
+from rftsim.law.rigid import surface_force
+from rftsim.sand.medium import ALPHA_Z_PLATE, Sand
+from rftsim.surface.triangles import Array
 
 UNITS: Final = {"xi_n": "N/m^3", "zeta": "N/m^3", "K": "N/m", "lambda_": "-", "mu_surf": "-"}
 

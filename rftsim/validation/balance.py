@@ -7,8 +7,8 @@ import numpy as np
 from rftsim_models.wheels import WheelParameters
 
 from rftsim.errors import RftsimError
-from rftsim.sand import Sand
-from rftsim.surface import Array
+from rftsim.sand.medium import Sand
+from rftsim.surface.triangles import Array
 from rftsim.validation import pockets
 from rftsim.validation.pockets import Grousers, Motion, Shaded
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from rftsim.errors import RftsimError
 from rftsim.fit.columns import read_columns, read_table
-from rftsim.surface import Array
+from rftsim.surface.triangles import Array
 
 WHEEL_FILE: Final = "cmu_wheel_grouser.csv"
 PLATE_FILE: Final = "cmu_circular_plate_sinkage.csv"

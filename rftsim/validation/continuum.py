@@ -15,10 +15,11 @@ from rftsim_mpm.reading import limit as limit_of
 from rftsim.fit.generic import Settings
 from rftsim.fit.plates import read_campaign
 from rftsim.fit.report import report
-from rftsim.laws import Law, fitted_law, get_law
-from rftsim.rigid import surface_force
-from rftsim.sand import ALPHA_Z_PLATE, Sand, xi_n_from_table
-from rftsim.surface import Array, make_surface
+from rftsim.law.laws import Law, fitted_law, get_law
+from rftsim.law.rigid import surface_force
+from rftsim.sand.medium import ALPHA_Z_PLATE, Sand
+from rftsim.sand.strength import xi_n_from_table
+from rftsim.surface.triangles import Array, make_surface
 from rftsim.validation.shipped import Results, found, shipped
 from rftsim.validation.study import Measured, Request, Row, at_most, near
 

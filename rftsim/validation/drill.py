@@ -6,9 +6,11 @@ from typing import Any, Final
 import numpy as np
 from rftsim_models.outline import extruded
 
-from rftsim.rigid import SurfaceForce, surface_force
-from rftsim.sand import PRESETS, Sand, xi_n_cubic
-from rftsim.surface import Array, Surface, make_surface
+from rftsim.law.rigid import SurfaceForce, surface_force
+from rftsim.sand.medium import Sand
+from rftsim.sand.presets import PRESETS
+from rftsim.sand.strength import xi_n_cubic
+from rftsim.surface.triangles import Array, Surface, make_surface
 from rftsim.validation.study import Measured, Request, Row, at_most, near
 
 RADIUS, LENGTH = 0.025, 0.14

@@ -13,7 +13,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from rftsim.sand import ALPHA_Z_PLATE, Sand, xi_n_cubic
+from rftsim.sand.medium import ALPHA_Z_PLATE, Sand
+from rftsim.sand.strength import xi_n_cubic
 from rftsim.validation import pockets, terramechanics
 from rftsim.validation.cmu import PLATE_FILE, SMOOTH_FILE, WHEEL_FILE, Runs, digest, read_plates, read_runs
 from rftsim.validation.pockets import Grousers, Motion, Shaded

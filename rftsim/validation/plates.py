@@ -10,9 +10,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from rftsim.rigid import surface_force
-from rftsim.sand import Sand
-from rftsim.surface import Array, Surface
+from rftsim.law.rigid import surface_force
+from rftsim.sand.medium import Sand
+from rftsim.surface.triangles import Array, Surface
 from rftsim.validation.study import Measured, Request, Row, near
 
 DRAG_DEPTHS: Final = (0.02, 0.03, 0.04)

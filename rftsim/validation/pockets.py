@@ -13,10 +13,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from rftsim_models.outline import extruded, lugged_outline
 
-from rftsim import native, packed
-from rftsim.laws import get_law
-from rftsim.sand import FreeSurface, Sand
-from rftsim.surface import Array, Surface, make_surface
+from rftsim.law import evaluate, layout
+from rftsim.law.laws import get_law
+from rftsim.sand.free_surface import FreeSurface
+from rftsim.sand.medium import Sand
+from rftsim.surface.triangles import Array, Surface, make_surface
 
 STRIPS, RINGS = 4, 6
 
@@ -55,7 +56,7 @@ class Grousers(NamedTuple):
     def _extruded(self, radius: float, height: float) -> Solid:
         outline = lugged_outline(radius, self.number, height, self.thickness, arc=6, flank=3 if height else 1, top=2)
         surface = make_surface(*extruded(outline, self.width, rings=RINGS, strips=STRIPS))
-        return Solid(surface, packed.pack_surface(surface))
+        return Solid(surface, layout.pack_surface(surface))
 
     def pocket_of(self, surface: Surface) -> Any:
         """Which pocket each triangle belongs to: from the middle of one grouser to that of the next."""
@@ -123,7 +124,7 @@ def _loads(solid: Solid, sand: Sand, motion: Motion, law: str) -> tuple[Array, A
     c, s = np.cos(motion.phase), np.sin(motion.phase)
     rotation = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
     omega, place = np.array([0.0, motion.rate, 0.0]), np.array([0.0, 0.0, motion.height])
-    bed = packed.pack_sand(sand, get_law(law), FreeSurface(), (0.0, 1.0, 0.0))
-    stress, _ = native.tractions(bed, solid.numbers, place, rotation.ravel(), motion.velocity, omega)
+    bed = layout.pack_sand(sand, get_law(law), FreeSurface(), (0.0, 1.0, 0.0))
+    stress, _ = evaluate.tractions(bed, solid.numbers, place, rotation.ravel(), motion.velocity, omega)
     velocity = motion.velocity + np.cross(omega, solid.surface.centres @ rotation.T)
     return stress @ rotation.T * solid.surface.areas[:, None], velocity

@@ -12,11 +12,11 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from rftsim_models.wheels import FOUR_FLAP_RUNNER, GROUSER_WHEEL, SERVO, WHEEL, WheelParameters, build_wheel
 
-from rftsim.run import STEADY, run
-from rftsim.scene import add_sand
-from rftsim.scenes import POPPY, Staged
-from rftsim.scenes import Measured as MeasuredBy
-from rftsim.surface import Wheel
+from rftsim.model.add_sand import add_sand
+from rftsim.run.run import STEADY, run
+from rftsim.run.scenes import POPPY, Staged
+from rftsim.run.scenes import Measured as MeasuredBy
+from rftsim.surface.triangles import Wheel
 from rftsim.validation.study import Measured, Request, Row, at_most
 
 TIMESTEP: Final = 5e-4

@@ -9,7 +9,7 @@ import rftsim_models
 
 import rftsim
 from rftsim.errors import RftsimError
-from rftsim.kept import Kept
+from rftsim.files import Kept
 from rftsim.validation import continuum, drill, measured, motion, plates, runner, scaling, wheel
 from rftsim.validation.study import Measured, Request, Row, Study
 

@@ -6,8 +6,8 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from rftsim_models.wheels import GROUSER_WHEEL
 
-from rftsim.sand import PRESETS
-from rftsim.surface import Array
+from rftsim.sand.presets import PRESETS
+from rftsim.surface.triangles import Array
 from rftsim.validation.balance import steady
 
 

@@ -14,8 +14,8 @@ from rftsim import make_sand
 from rftsim.fit.generic import reference_grid
 from rftsim.fit.plates import Plates
 from rftsim.fit.report import predict
-from rftsim.sand import ALPHA_Z_PLATE
-from rftsim.tables import TABLE_C3
+from rftsim.law.tables import TABLE_C3
+from rftsim.sand.medium import ALPHA_Z_PLATE
 
 XI_N = 0.8e6
 

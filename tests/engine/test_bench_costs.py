@@ -7,7 +7,7 @@ import pytest
 
 from rftsim.bench import environment, pareto
 from rftsim.bench.pareto import Compared, Tried
-from rftsim.plots import plot_environment, plot_pareto
+from rftsim.view.plots import plot_environment, plot_pareto
 
 
 def tried(cost, error, h=1e-3):

@@ -16,8 +16,8 @@ from mujoco import rollout
 from trees import BALL, SAND, sandy, spec_of, trajectory, tree
 
 from rftsim import add_sand, wrenches
-from rftsim.packed import SAND_FIELDS
-from rftsim.readout import instances
+from rftsim.law.layout import SAND_FIELDS
+from rftsim.model.readout import instances
 
 NSTEP = 40
 

@@ -10,10 +10,10 @@ from trees import SAND, spec_of, xml
 
 import rftsim
 from rftsim import FreeSurface, SceneError, add_sand
-from rftsim.advice import advise
-from rftsim.geometry import body_surface
-from rftsim.reach import clearance, sampled_reach
-from rftsim.scenes import stage
+from rftsim.model.geometry import body_surface
+from rftsim.model.reach import clearance, sampled_reach
+from rftsim.run.advice import advise
+from rftsim.run.scenes import stage
 
 CRANE = """
 <body name="crane" pos="1 0 1">

@@ -11,8 +11,8 @@ from shapes import blob
 from trees import BALL, SAND, sandy, spec_of
 
 import rftsim
-from rftsim.law_file import law_text, read_table
-from rftsim.tables import TABLE_C3, TABLE_C4
+from rftsim.law.law_file import law_text, read_table
+from rftsim.law.tables import TABLE_C3, TABLE_C4
 
 FALL = 30
 

@@ -7,7 +7,7 @@ from shapes import about
 from trees import BALL, SAND, sandy, shaken, spec_of
 
 from rftsim import FreeSurface, RftsimWarning, SceneError, SurfaceError, add_sand, instances, tractions, wrenches
-from rftsim.surface import Wheel
+from rftsim.surface.triangles import Wheel
 
 WHEEL = """
   <body name="car" pos="0 0 .05"><freejoint/><geom type="box" size=".2 .1 .02" pos="0 0 .1"/>

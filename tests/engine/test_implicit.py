@@ -6,9 +6,9 @@ import pytest
 
 import rftsim
 from rftsim.bench import hard_cases, stability
-from rftsim.kept import Kept
-from rftsim.state import HEAD, SPLIT
-from rftsim.stepping import GAIN
+from rftsim.files import Kept
+from rftsim.solver.state import HEAD, SPLIT
+from rftsim.solver.time_step import GAIN
 
 SAND = rftsim.Sand(xi_n=0.92e6, mu_surf=0.4)
 SHAPES = {

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 import rftsim
-from rftsim import compiled, machine_code, native_build
 from rftsim.engine import layout
+from rftsim.machine import build, link, sources
 
 PACKAGE = Path(rftsim.__file__).parent
 MODELS = Path(__file__).parents[2] / "models"
@@ -66,30 +66,30 @@ def fresh(tmp_path):
 @pytest.mark.parametrize("part", PARTS)
 def test_what_ships_was_made_from_these_sources(part):
     """Its key is that of the sources, and of MuJoCo's constants."""
-    key = machine_code.key_of(PARTS[part])
-    shipped = machine_code.shipped_file(part).read_bytes()
+    key = link.key_of(PARTS[part])
+    shipped = link.shipped_file(part).read_bytes()
     assert shipped.startswith(key), "compiled code was edited: `make native` makes its machine code anew"
     assert len(shipped) < 200_000
 
 
 def test_every_source_of_machine_code_counts():
     """The key has each module that imports numba, and whatever of rftsim such a module imports."""
-    files = {path.relative_to(PACKAGE).as_posix() for path in compiled.FILES}
+    files = {path.relative_to(PACKAGE).as_posix() for path in sources.FILES}
     for path in PACKAGE.rglob("*.py"):
         name, text = path.relative_to(PACKAGE).as_posix(), path.read_text()
         if "\nfrom numba import" not in text:
             continue
-        assert name in files, f"{name} imports numba and is not among compiled.FILES"
+        assert name in files, f"{name} imports numba and is not among sources.FILES"
         for node in ast.walk(ast.parse(text)):
             if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("rftsim"):
                 parts = (node.module or "").split(".")[1:]
                 for alias in node.names:
                     inner = "/".join([*parts, alias.name]) + ".py"
                     found = inner if (PACKAGE / inner).exists() else "/".join(parts) + ".py"
-                    assert found in files, f"{name} imports {found}, which is not among compiled.FILES"
+                    assert found in files, f"{name} imports {found}, which is not among sources.FILES"
 
 
-@pytest.mark.skipif(not machine_code.takes_shipped(), reason="what ships is for another processor")
+@pytest.mark.skipif(not link.takes_shipped(), reason="what ships is for another processor")
 def test_first_force_compiles_nothing(fresh):
     """3 s of the processor in a fresh process with nothing cached, 1.5 s with Python's own cache; no cache of ours."""
     (fresh / "cache").mkdir()
@@ -119,12 +119,12 @@ def compiler(monkeypatch):
     """What ships does not fit, and compiling is counted instead of done."""
     made = []
 
-    def build(part):
+    def compile_part(part):
         made.append(part)
         return b"machine code of " + part.encode()
 
-    monkeypatch.setattr(machine_code, "takes_shipped", lambda: False)
-    monkeypatch.setattr(native_build, "build", build)
+    monkeypatch.setattr(link, "takes_shipped", lambda: False)
+    monkeypatch.setattr(build, "build", compile_part)
     return made
 
 
@@ -132,14 +132,14 @@ def test_what_was_compiled_is_kept_where_numba_keeps_its_cache(compiler, tmp_pat
     """Once for NUMBA_CACHE_DIR, and anew where the file is not whole or was made from something else."""
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     for _ in range(2):
-        assert machine_code.object_file("law", "") == b"machine code of law"
+        assert link.object_file("law", "") == b"machine code of law"
     assert compiler == ["law"]
     assert len(caplog.records) == 1
     (kept,) = tmp_path.iterdir()
     kept.write_bytes(kept.read_bytes()[:-5])
-    machine_code.object_file("law", "")
-    machine_code.object_file("law", "other constants")
-    machine_code.object_file("law", "")
+    link.object_file("law", "")
+    link.object_file("law", "other constants")
+    link.object_file("law", "")
     assert compiler == ["law"] * 3
 
 
@@ -148,7 +148,7 @@ def test_no_folder_to_write_to_is_no_error(compiler, tmp_path, monkeypatch):
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "file" / "cache"))
     for _ in range(2):
-        assert machine_code.object_file("law", "") == b"machine code of law"
+        assert link.object_file("law", "") == b"machine code of law"
     assert compiler == ["law", "law"]
 
 
@@ -156,10 +156,10 @@ def test_users_cache_follows_the_package(compiler, tmp_path, monkeypatch):
     """Without NUMBA_CACHE_DIR: the package's __pycache__, then the user's folder, whose name may be missing."""
     monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    assert machine_code.folders() == [PACKAGE / "__pycache__", tmp_path / "numba"]
+    assert link.folders() == [PACKAGE / "__pycache__", tmp_path / "numba"]
     monkeypatch.delenv("XDG_CACHE_HOME")
     monkeypatch.setattr(os.path, "expanduser", lambda path: path)
-    assert machine_code.folders() == [PACKAGE / "__pycache__"]
+    assert link.folders() == [PACKAGE / "__pycache__"]
 
 
 @pytest.mark.slow

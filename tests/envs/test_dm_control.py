@@ -18,9 +18,9 @@ from rftsim_envs import dm
 from rftsim_models.wheels import GROUSER_WHEEL
 
 import rftsim
-from rftsim.packed import SAND_FIELDS
-from rftsim.run import run
-from rftsim.scenes import stage
+from rftsim.law.layout import SAND_FIELDS
+from rftsim.run.run import run
+from rftsim.run.scenes import stage
 
 XI_N = SAND_FIELDS.index("xi_n")
 tasks = pytest.mark.parametrize(("domain", "task"), dm.ALL_TASKS)

@@ -9,9 +9,9 @@ from rftsim_models.outline import extruded, lugged_outline
 from rftsim_models.wheels import FOUR_FLAP_RUNNER, GROUSER_WHEEL, HALF_GROUSER_WHEEL, build_wheel
 
 from rftsim import Wheel, add_sand
-from rftsim.demo import measure
-from rftsim.run import run
-from rftsim.scenes import SCENES, Measured, Staged, stage
+from rftsim.run.rates import measure
+from rftsim.run.run import run
+from rftsim.run.scenes import SCENES, Measured, Staged, stage
 
 
 def slip_and_sinkage(scene, law, rpm, sand=None, duration=4.0, timestep=None):

@@ -12,11 +12,11 @@ from pathlib import Path
 
 import numpy as np
 
-from rftsim import tables
 from rftsim.bench import kernel, loops
-from rftsim.laws import get_law
-from rftsim.packed import pack_sand, pack_surface, read_columns
-from rftsim.sand import FreeSurface
+from rftsim.law import tables
+from rftsim.law.laws import get_law
+from rftsim.law.layout import pack_sand, pack_surface, read_columns
+from rftsim.sand.free_surface import FreeSurface
 
 COMPILER = ["cc", "-O3", "-march=native", "-ffast-math"]
 SIZES = (64, 1024, 20480)

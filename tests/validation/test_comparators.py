@@ -9,7 +9,7 @@ import trimesh
 from rftsim_models.wheels import GROUSER_WHEEL
 
 from rftsim import RftsimError, make_surface
-from rftsim.scenes import POPPY
+from rftsim.run.scenes import POPPY
 from rftsim.validation.balance import grousered
 from rftsim.validation.drill import RADIUS, curvature_radius, upright
 from rftsim.validation.terramechanics import Soil, sinkage_under, wheel_force

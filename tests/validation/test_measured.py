@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rftsim import surface_force
-from rftsim.sand import Sand
+from rftsim.sand.medium import Sand
 from rftsim.validation import measured, pockets
 from rftsim.validation.cmu import WHEEL_FILE
 from rftsim.validation.pockets import Grousers, Motion, Shaded

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rftsim.cli import main
-from rftsim.kept import Kept
+from rftsim.files import Kept
 from rftsim.validation import plates
 from rftsim.validation.cmu import PLATE_FILE, WHEEL_FILE
 from rftsim.validation.study import Row, at_least, at_most, near

@@ -7,7 +7,7 @@ import pytest
 from shapes import about, alpha, plate, rim, rotation, unit
 
 from rftsim import Sand, make_surface, surface_force
-from rftsim.surface import Surface, Wheel
+from rftsim.surface.triangles import Surface, Wheel
 
 PAIRS = [("rft2d", "drft2d"), ("rft3d", "drft3d"), ("rft3d:c4", "drft3d:c4")]
 SAND = Sand(xi_n=1e6, rho_c=638.0, lambda_=1.1, g=9.8)

@@ -10,10 +10,10 @@ from rftsim_models.outline import extruded
 from shapes import ONE, blob, rim
 
 from rftsim import PRESETS, FreeSurface, make_surface, surface_force
-from rftsim.economy import DEPTHS, HELD_BACK, draw, errors, free_reach, reduced, wrenches
-from rftsim.facets import merged, settled, split
-from rftsim.laws import get_law
-from rftsim.packed import BLOCK, pack_sand
+from rftsim.law.laws import get_law
+from rftsim.law.layout import BLOCK, pack_sand
+from rftsim.reduction.facets import merged, settled, split
+from rftsim.reduction.reduce import DEPTHS, HELD_BACK, draw, errors, free_reach, reduced, wrenches
 
 BED = pack_sand(PRESETS["poppy-seeds"], get_law("rft3d"), FreeSurface(), (0, 1, 0))
 

@@ -12,9 +12,9 @@ from rftsim.fit.estimate import estimate
 from rftsim.fit.generic import Settings, coefficients, design, fit, law_and_slope, on_plates, reference_grid
 from rftsim.fit.plates import Plates, directions, leading_faces
 from rftsim.fit.report import predict, report
-from rftsim.laws import fitted_law
-from rftsim.sand import ALPHA_Z_PLATE
-from rftsim.tables import TABLE_C3, TABLE_C4
+from rftsim.law.laws import fitted_law
+from rftsim.law.tables import TABLE_C3, TABLE_C4
+from rftsim.sand.medium import ALPHA_Z_PLATE
 
 ROUGH = 1e9
 XI_N = 0.92e6

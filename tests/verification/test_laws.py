@@ -10,10 +10,11 @@ import pytest
 import trimesh
 from shapes import ONE, alpha, blob, rotation, unit
 
-from rftsim import FreeSurface, Sand, Surface, make_surface, surface_force, tables
-from rftsim.kernels import cubic, quartic
-from rftsim.sand import xi_n_cubic
-from rftsim.surface import Wheel
+from rftsim import FreeSurface, Sand, Surface, make_surface, surface_force
+from rftsim.law import tables
+from rftsim.law.kernels import cubic, quartic
+from rftsim.sand.strength import xi_n_cubic
+from rftsim.surface.triangles import Wheel
 
 SHARED = Path(__file__).parents[3] / "shared"
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from rftsim import PRESETS, FreeSurface, RftsimWarning, Sand, SandError, make_sand
-from rftsim.sand import ALPHA_Z_PLATE, xi_n_cubic, xi_n_from_table
-from rftsim.tables import TABLE_C1
+from rftsim.sand.medium import ALPHA_Z_PLATE
+from rftsim.sand.strength import TABLE_C1, xi_n_cubic, xi_n_from_table
 
 RHO_C = 3000.0
 

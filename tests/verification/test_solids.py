@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from rftsim import make_surface, solids
-from rftsim.splitting import split
+from rftsim import make_surface
+from rftsim.surface import solids
+from rftsim.surface.splitting import split
 
 
 @pytest.mark.parametrize("subdivisions", [0, 2, 3])

@@ -8,7 +8,7 @@ import trimesh
 from shapes import rotation
 
 from rftsim import Sand, Surface, SurfaceError, load_surface, make_surface, surface_force
-from rftsim.surface import Wheel
+from rftsim.surface.triangles import Wheel
 
 CUBE = trimesh.creation.box((0.2, 0.3, 0.4))
 

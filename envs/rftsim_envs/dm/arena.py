@@ -9,9 +9,9 @@ import numpy as np
 from dm_control import composer, mjcf
 from lxml import etree
 
-from rftsim.laws import Law
-from rftsim.sand import Sand
-from rftsim.scene import add_sand
+from rftsim.law.laws import Law
+from rftsim.model.add_sand import add_sand
+from rftsim.sand.medium import Sand
 
 _SAND = ((0.78, 0.71, 0.52), (0.72, 0.64, 0.45))
 _ALPHA = 0.7

@@ -8,7 +8,7 @@ from dm_control.rl import control
 from dm_control.utils import containers, rewards
 from rftsim_models.wheels import GROUSER_WHEEL
 
-from rftsim.sand import PRESETS
+from rftsim.sand.presets import PRESETS
 from rftsim_envs.dm import wheel
 
 TIME_LIMIT: Final = 10.0

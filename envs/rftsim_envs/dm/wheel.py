@@ -14,11 +14,11 @@ from dm_env import specs
 from numpy.typing import NDArray
 from rftsim_models.wheels import CARRIAGE, WHEEL, WheelParameters, build_wheel
 
-from rftsim.packed import STRENGTHS
-from rftsim.readout import instances, wrenches
-from rftsim.sand import Sand
-from rftsim.scene import add_sand
-from rftsim.surface import Wheel
+from rftsim.law.layout import STRENGTHS
+from rftsim.model.add_sand import add_sand
+from rftsim.model.readout import instances, wrenches
+from rftsim.sand.medium import Sand
+from rftsim.surface.triangles import Wheel
 
 Array = NDArray[np.float64]
 Observation = collections.OrderedDict[str, Array]

@@ -9,7 +9,7 @@ from typing import Any, Final, NamedTuple
 import gymnasium as gym
 import numpy as np
 
-from rftsim.sand import make_sand
+from rftsim.sand.presets import make_sand
 from rftsim_envs import ground, tasks
 from rftsim_envs.episodes import Episodes
 from rftsim_envs.physics import Many

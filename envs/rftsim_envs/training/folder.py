@@ -21,7 +21,7 @@ from typing import Any, Final
 
 from rftsim.errors import RftsimWarning
 from rftsim.files import replacing
-from rftsim.sand import make_sand
+from rftsim.sand.presets import make_sand
 from rftsim_envs import tasks
 from rftsim_envs.recipe import Training, TrainingError
 

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib import image
 from numpy.typing import NDArray
 
-from rftsim.render import render
+from rftsim.view.render import render
 from rftsim_envs.env import SandEnv
 from rftsim_envs.recipe import TrainingError
 from rftsim_envs.tally import Tally

@@ -1,0 +1,46 @@
+"""The laws' loops, called from Python."""
+
+import ctypes
+import functools
+from typing import Any
+
+import numpy as np
+
+from rftsim.machine import link
+from rftsim.surface.triangles import Array
+
+
+@functools.cache
+def _function(name: str, arguments: int) -> Any:
+    """A function of the machine code that takes addresses and gives nothing."""
+    return ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * arguments)(link.load("law")(name))
+
+
+def tractions(sand: Array, body: Array, xpos: Any, xmat: Any, velocity: Any, omega: Any) -> tuple[Array, Array]:
+    """Each triangle's stress [Pa] in the body frame, (ntri, 3), and effective depth [m], (ntri,)."""
+    ntri = int(body[14])
+    arrays = [np.ascontiguousarray(x, dtype=float) for x in (sand, body, xpos, xmat, velocity, omega)]
+    stress, depth = np.empty((ntri, 3)), np.empty(ntri)
+    _function("rftsim_tractions", 8)(*(array.ctypes.data for array in (*arrays, stress, depth)))
+    return stress, depth
+
+
+def wrenches(sand: Array, body: Array, xpos: Array, xmat: Array, velocity: Array, omega: Array) -> Array:
+    """Force [N] and moment about the body's origin [N m], world frame, (n, 6).
+
+    Args:
+        sand: Packed sand.
+        body: Packed surface.
+        xpos: Positions of the body's origin [m], (n, 3).
+        xmat: Rotations to the world frame, (n, 3, 3).
+        velocity: Velocities of the body's origin [m/s], (n, 3).
+        omega: Angular velocities, world frame [rad/s], (n, 3).
+    """
+    out = np.empty((len(xpos), 6))
+    arrays = [*(np.ascontiguousarray(x, dtype=float) for x in (xpos, xmat, velocity, omega)), out]
+    rows = zip(*(range(a.ctypes.data, a.ctypes.data + a.nbytes, a.strides[0]) for a in arrays), strict=True)
+    fixed = sand.ctypes.data, body.ctypes.data
+    wrench = _function("rftsim_wrench", 7)
+    for row in rows:
+        wrench(*fixed, *row)
+    return out

@@ -1,0 +1,133 @@
+"""Compiles the entries with numba to object files, and writes those that ship: `make native`."""
+
+import importlib
+import logging
+import re
+import sys
+import types
+from pathlib import Path
+from typing import Any, Final
+
+import llvmlite.binding as llvm
+import numba
+from numba import njit
+from numba import types as numba_types
+
+_LOG: Final = logging.getLogger(__name__)
+_MODULES: Final = {
+    "law": (
+        "rftsim.law.exports",
+        "rftsim.law.exports_ahead",
+        "rftsim.solver.native_solver",
+        "rftsim.solver.native_step",
+    ),
+    "engine": ("rftsim.engine.callbacks",),
+}
+_C: Final = {numba_types.void: "void", numba_types.intp: "i64", numba_types.intc: "i32", numba_types.float64: "double"}
+_OUTSIDE: Final = re.compile(r"rftsim_\w+|mjd?_\w+|PyMem_RawMalloc|PyMem_RawCalloc|PyMem_RawFree|atan2|sqrt|llvm\..*")
+"""What an object may need from elsewhere."""
+_RAISED: Final = re.compile(r'(@\.const\.pickledata\.\S+ = .*\[\d+ x i8\]) c"[^"]*"')
+"""What numba would raise, which may name files of this machine; nobody reads it."""
+_FAILED: Final = "rftsim_failed"
+_UNCOUNTED: Final = "define void @NRT_MemInfo_call_dtor(ptr %memory) { unreachable }"
+"""Every array here is a view of memory that nobody counts references to."""
+
+
+def build(part: str, cpu: str | None = None) -> bytes:
+    """The object file of a part, for this processor, or for one that numba was told of."""
+    for module in _MODULES[part]:
+        importlib.import_module(module)
+    from rftsim.machine.exports import ENTRIES
+
+    for name in ENTRIES:  # numba links what it compiles, though none of it runs before it is all here
+        if llvm.address_of_symbol(name) is None:
+            llvm.add_symbol(name, id(ENTRIES))
+    own = {name: entry for name, entry in ENTRIES.items() if entry[0].__module__ in _MODULES[part]}
+    whole = llvm.parse_assembly(_UNCOUNTED)
+    for name, (function, signature) in own.items():
+        _LOG.info("compiling %s", name)
+        compiled = njit(signature, no_cpython_wrapper=True, no_cfunc_wrapper=True)(function)
+        result = compiled.overloads[signature.args]
+        whole.link_in(llvm.parse_assembly(_RAISED.sub(r"\1 zeroinitializer", compiled.inspect_llvm(signature.args))))
+        whole.link_in(llvm.parse_assembly(_entry(name, signature, result.fndesc.mangled_name)))
+    machine = _machine(cpu)
+    _strip(whole, own, machine)
+    _optimise(whole, machine)
+    return bytes(machine.emit_object(whole))
+
+
+def _entry(name: str, signature: Any, compiled: str) -> str:
+    """A C function that calls a compiled one, and says where that raised something."""
+    c = _C[signature.return_type]
+    result = "ptr" if c == "void" else c
+    parameters = ", ".join(f"{_C[argument]} %a{k}" for k, argument in enumerate(signature.args))
+    return f"""
+        @name.{name} = private constant [{len(name) + 1} x i8] c"{name}\\00"
+        declare void @{_FAILED}(ptr)
+        declare i32 @"{compiled}"(ptr, ptr{"".join(f", {_C[a]}" for a in signature.args)})
+        define {c} @{name}({parameters}) {{
+            %result = alloca {result}
+            %raised = alloca ptr
+            store {result} {"null" if c == "void" else 0}, ptr %result
+            %status = call i32 @"{compiled}"(ptr %result, ptr %raised, {parameters})
+            %bad = icmp ne i32 %status, 0
+            br i1 %bad, label %failed, label %done
+        failed:
+            call void @{_FAILED}(ptr @name.{name})
+            br label %done
+        done:
+            {"ret void" if c == "void" else f"%value = load {c}, ptr %result"}
+            {"" if c == "void" else f"ret {c} %value"}
+        }}
+    """
+
+
+def _machine(cpu: str | None) -> llvm.TargetMachine:
+    """What emits code as numba's own does."""
+    features = llvm.get_host_cpu_features().flatten() if cpu is None else ""
+    return llvm.Target.from_default_triple().create_target_machine(
+        cpu=cpu or llvm.get_host_cpu_name(), features=features, opt=3, reloc="static", codemodel="jitdefault", jit=True
+    )
+
+
+def _strip(module: llvm.ModuleRef, keep: Any, machine: llvm.TargetMachine) -> None:
+    """Leave the entries and what they call."""
+    for value in (*module.functions, *module.global_variables):
+        if not value.is_declaration and value.name not in keep:
+            value.linkage = "private"
+    passes = llvm.create_new_module_pass_manager()
+    passes.add_global_dead_code_eliminate_pass()
+    passes.run(module, _builder(machine))
+    for value in (*module.functions, *module.global_variables):
+        if value.is_declaration and not _OUTSIDE.fullmatch(value.name):
+            raise RuntimeError(f"compiled code needs {value.name}, which machine code on its own cannot have")
+
+
+def _optimise(module: llvm.ModuleRef, machine: llvm.TargetMachine) -> None:
+    """Once more, as a whole: what calls what is known now, so that arguments which nobody reads can go."""
+    builder = _builder(machine)
+    builder.getModulePassManager().run(module, builder)
+
+
+def _builder(machine: llvm.TargetMachine) -> llvm.PassBuilder:
+    return llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options(speed_level=3))
+
+
+def ship() -> None:
+    """Write the object files that ship."""
+    logging.basicConfig(level=logging.INFO, format="%(message)s")
+    package = types.ModuleType("rftsim")  # instead of the package, which would compile for this machine first
+    package.__path__ = [str(Path(__file__).parent.parent)]
+    sys.modules["rftsim"] = package
+    link, layout = (importlib.import_module(f"rftsim.{name}") for name in ("machine.link", "engine.layout"))
+    numba.config.CPU_NAME, numba.config.CPU_FEATURES = link.SHIPPED_FOR, ""
+    layout.publish()
+    for part, given in (("law", ""), ("engine", layout.GIVEN)):
+        path = link.shipped_file(part)
+        code = build(part, link.SHIPPED_FOR)
+        if not link.write(path, link.key_of(given), code):
+            raise OSError(f"cannot write {path}")
+
+
+if __name__ == "__main__":
+    ship()

@@ -1,0 +1,138 @@
+"""Machine code of the entries: what ships where it fits, else what was compiled before, else compiled now.
+
+It is made by `native_build` in parts, each an object file of LLVM. What ships is for x86-64-v3 under Linux and was made
+from these very sources; then neither numba nor a cache is needed.
+"""
+
+import ctypes
+import functools
+import hashlib
+import logging
+import lzma
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final
+
+import llvmlite
+import llvmlite.binding as llvm
+
+from rftsim.errors import RftsimError
+from rftsim.files import replacing
+from rftsim.machine.sources import PACKAGE, SOURCE
+
+SHIPPED: Final = Path(__file__).parent / "shipped"
+SHIPPED_FOR: Final = "x86-64-v3"
+_LOG: Final = logging.getLogger(__name__)
+_FEATURES: Final = ("avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe")
+
+
+@functools.cache
+def load(part: str, given: str = "") -> Callable[[str], int]:
+    """Link a part into the process: `law`, or `engine`, which calls the law's.
+
+    Args:
+        part: Its name.
+        given: What else it is compiled from than the sources.
+
+    Returns:
+        What gives an entry's address by name.
+    """
+    engine = _engine()
+    engine.add_object_file(llvm.ObjectFileRef.from_data(object_file(part, given)))
+    engine.finalize_object()
+
+    def address(name: str) -> int:
+        found: int = engine.get_function_address(name)
+        llvm.add_symbol(name, found)
+        return found
+
+    return address
+
+
+def _failed(name: bytes) -> None:
+    """Called by machine code that met what Python would raise an error for."""
+    _LOG.error("%s divided by zero or the like; this force of the sand is not to be trusted", name.decode())
+
+
+_FAILED: Final = ctypes.CFUNCTYPE(None, ctypes.c_char_p)(_failed)
+
+
+@functools.cache
+def _engine() -> llvm.ExecutionEngine:
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    llvm.add_symbol("rftsim_failed", ctypes.cast(_FAILED, ctypes.c_void_p).value)
+    machine = llvm.Target.from_default_triple().create_target_machine(jit=True)
+    return llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
+
+
+def object_file(part: str, given: str) -> bytes:
+    """A part's object file."""
+    key = key_of(given)
+    if takes_shipped() and (code := _read(shipped_file(part), key)) is not None:
+        return code
+    machine = f"{llvm.get_host_cpu_name()} {llvm.get_host_cpu_features().flatten()} {llvmlite.__version__}"
+    key = hashlib.sha256(key + machine.encode()).digest()
+    name = f"rftsim-{part}-{key.hex()[:16]}.o.xz"
+    for folder in folders():
+        if (code := _read(folder / name, key)) is not None:
+            return code
+    _LOG.warning("rftsim compiles its %s for this machine, once; it takes a minute or two", part)
+    from rftsim.machine.build import build  # which needs numba
+
+    code = build(part)
+    for folder in folders():
+        if write(folder / name, key, code):
+            break
+    return code
+
+
+def key_of(given: str) -> bytes:
+    """Identifies what a part is compiled from."""
+    return hashlib.sha256(SOURCE + given.encode()).digest()
+
+
+def shipped_file(part: str) -> Path:
+    """Where a part lies that ships with the package."""
+    return SHIPPED / f"{part}-{SHIPPED_FOR}.o.xz"
+
+
+def takes_shipped() -> bool:
+    """Whether this process can run what ships."""
+    triple = llvm.get_process_triple()
+    if not (triple.startswith("x86_64") and "linux" in triple):
+        return False
+    features = llvm.get_host_cpu_features()
+    return all(features.get(name, False) for name in _FEATURES)
+
+
+def folders() -> list[Path]:
+    """Where compiled code may be kept, by numba's convention."""
+    if chosen := os.environ.get("NUMBA_CACHE_DIR"):
+        return [Path(chosen)]
+    users = {"darwin": "~/Library/Caches", "win32": "~/AppData/Local"}.get(sys.platform, "~/.cache")
+    users = os.path.expanduser(os.environ.get("XDG_CACHE_HOME") or users)
+    own = PACKAGE / "__pycache__"
+    return [own, Path(users) / "numba"] if os.path.isabs(users) else [own]  # else it knows no home
+
+
+def _read(path: Path, key: bytes) -> bytes | None:
+    """A whole object file that was written under the same key, or None."""
+    try:
+        found = path.read_bytes()
+        return lzma.decompress(found[len(key) :]) if found.startswith(key) else None
+    except (OSError, lzma.LZMAError):
+        return None
+
+
+def write(path: Path, key: bytes, code: bytes) -> bool:
+    """Write an object file, whole or not at all; whether it could be written."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with replacing(path) as temporary:
+            temporary.write_bytes(key + lzma.compress(code))
+    except (OSError, RftsimError):
+        return False
+    return True

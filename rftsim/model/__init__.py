@@ -1,0 +1,1 @@
+"""Sand in MuJoCo models: put under them, and read from them."""

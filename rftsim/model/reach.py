@@ -1,0 +1,133 @@
+"""Where a model's joints let a body go: orientations, motions, and how near to the sand it can come."""
+
+import math
+from typing import Final
+
+import mujoco
+import numpy as np
+
+from rftsim.reduction.reduce import POSES, Reach, middle
+from rftsim.sand.free_surface import FreeSurface
+from rftsim.surface.triangles import Array, Surface
+
+_JOINT = mujoco.mjtJoint
+GIVE: Final = 0.05
+"""Share of its range by which a joint may pass its limits, which are soft."""
+
+
+def sampled_reach(model: mujoco.MjModel, body: int, surface: Surface, seed: int) -> Reach:
+    """Orientations and motions of a body at joint positions drawn within their ranges.
+
+    Args:
+        model: Compiled.
+        body: The body's id.
+        surface: Its surface.
+        seed: Of the joint positions.
+    """
+    rng = np.random.default_rng(seed)
+    data = mujoco.MjData(model)
+    turn, motions = np.empty((POSES, 3, 3)), np.empty((POSES, 6, 6))
+    jacobian, scale = np.empty((2, 3, model.nv)), np.repeat([1.0, surface.size / 2], 3)
+    for i in range(POSES):
+        _scatter(model, data.qpos, rng)
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        turn[i] = data.xmat[body].reshape(3, 3)
+        mujoco.mj_jac(model, data, jacobian[0], jacobian[1], data.xpos[body] + turn[i] @ middle(surface), body)
+        basis, share, _ = np.linalg.svd(scale[:, None] * jacobian.reshape(6, -1), full_matrices=False)
+        basis = basis[:, share > 1e-9 * share[0]]
+        motions[i] = basis @ basis.T
+    return Reach(turn, motions)
+
+
+def _scatter(model: mujoco.MjModel, qpos: Array, rng: np.random.Generator) -> None:
+    """Draw joint positions within their ranges; where a body stands does not matter, so free ones stay."""
+    for joint in range(model.njnt):
+        kind, at = _JOINT(model.jnt_type[joint]), model.jnt_qposadr[joint]
+        limited, (low, high) = bool(model.jnt_limited[joint]), model.jnt_range[joint]
+        if kind in (_JOINT.mjJNT_FREE, _JOINT.mjJNT_BALL):
+            at += 3 if kind == _JOINT.mjJNT_FREE else 0
+            from scipy.spatial.transform import Rotation  # not at start-up, see `facets`
+
+            turned = Rotation.random(random_state=rng)
+            if limited:
+                axis = turned.apply([0.0, 0.0, 1.0])
+                turned = Rotation.from_rotvec(rng.uniform(0.0, high) * axis)
+            qpos[at : at + 4] = np.roll(turned.as_quat(), 1)
+        elif limited:
+            qpos[at] = rng.uniform(low, high)
+        elif kind == _JOINT.mjJNT_HINGE:
+            qpos[at] = rng.uniform(-math.pi, math.pi)
+
+
+def stays_in_plane(model: mujoco.MjModel, body: int, plane: Array) -> bool:
+    """Whether every joint above a body is a slide or a hinge about the plane's normal, from an upright rest pose."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    if not np.allclose(data.xmat[body].reshape(3, 3) @ plane, plane, atol=1e-9):
+        return False
+    while body != 0:
+        for joint in range(model.body_jntadr[body], model.body_jntadr[body] + model.body_jntnum[body]):
+            kind = _JOINT(model.jnt_type[joint])
+            about = abs(data.xaxis[joint] @ plane) > 1.0 - 1e-9
+            if kind != _JOINT.mjJNT_SLIDE and not (kind == _JOINT.mjJNT_HINGE and about):
+                return False
+        body = model.body_parentid[body]
+    return True
+
+
+def clearance(model: mujoco.MjModel, body: int, surface: Surface, free_surface: FreeSurface) -> float:
+    """A height over the sand that a body cannot come below, by its tree and its joints' ranges [m]; or -inf.
+
+    Along the way from the world, a slide lowers what hangs on it by its range, and a hinge that is not upright, or a
+    ball, may turn it about its anchor any way: less than what the joints allow is never assumed.
+    """
+    chain = [body]
+    while chain[-1] != 0:
+        chain.append(int(model.body_parentid[chain[-1]]))
+    height = -free_surface.offset
+    tilt: Array | None = np.array(free_surface.normal)
+    """Up in the frame so far; None where a joint may have turned it any way."""
+
+    def along(vector: Array) -> float:
+        return float(tilt @ vector) if tilt is not None else -float(np.linalg.norm(vector))
+
+    for part in reversed(chain[:-1]):
+        if model.body_mocapid[part] >= 0:
+            return -math.inf
+        height += along(model.body_pos[part])
+        if tilt is not None:
+            tilt = _turned_back(model.body_quat[part], tilt)
+        for joint in range(model.body_jntadr[part], model.body_jntadr[part] + model.body_jntnum[part]):
+            kind, axis = _JOINT(model.jnt_type[joint]), model.jnt_axis[joint]
+            if kind == _JOINT.mjJNT_FREE:
+                return -math.inf
+            if kind == _JOINT.mjJNT_SLIDE:
+                height += _lowered(model, joint, None if tilt is None else float(tilt @ axis))
+            elif tilt is None or kind == _JOINT.mjJNT_BALL or abs(tilt @ axis) < 1.0 - 1e-9:
+                anchor = model.jnt_pos[joint]
+                height += along(anchor) - float(np.linalg.norm(anchor))
+                tilt = None
+    if tilt is None:
+        return height - float(np.linalg.norm(surface.corners, axis=1).max())
+    return height + float((surface.corners @ tilt).min())
+
+
+def _lowered(model: mujoco.MjModel, joint: int, slope: float | None) -> float:
+    """The most that a slide lowers what hangs on it [m], not positive; slope: rise per travel, None for any."""
+    if slope is not None and abs(slope) < 1e-9:
+        return 0.0
+    if not model.jnt_limited[joint]:
+        return -math.inf
+    low, high = model.jnt_range[joint] - model.qpos0[model.jnt_qposadr[joint]]
+    give = GIVE * (high - low)
+    if slope is None:
+        return -float(max(abs(low), abs(high)) + give)
+    return float(min(slope * (low - give), slope * (high + give)))
+
+
+def _turned_back(quat: Array, vector: Array) -> Array:
+    out, inverse = np.empty(3), np.empty(4)
+    mujoco.mju_negQuat(inverse, quat)
+    mujoco.mju_rotVecQuat(out, vector, inverse)
+    return out

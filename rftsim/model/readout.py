@@ -1,0 +1,162 @@
+"""What the sand does to a model's bodies, read from the model and its data."""
+
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from rftsim.engine.block import BODY_MARKER, SAND_MARKER, read_counters, read_wrenches
+from rftsim.errors import SceneError
+from rftsim.law import evaluate, layout
+from rftsim.surface.triangles import Array
+
+
+class Wrenches(NamedTuple):
+    """The sand's action on each body of a model, world frame; zero on bodies that do not feel it."""
+
+    force: Array
+    """[N], shape (nbody, 3)."""
+    moment: Array
+    """About the body's origin, `data.xpos` [N m], shape (nbody, 3)."""
+    power: Array
+    """Power of the sand on the body [W], shape (nbody,); negative where it resists."""
+
+
+class Tractions(NamedTuple):
+    """The sand's action on each triangle of a body, world frame."""
+
+    centre: Array
+    """Centroid [m], shape (ntri, 3)."""
+    normal: Array
+    """Outward normal, shape (ntri, 3)."""
+    area: Array
+    """[m^2], shape (ntri,)."""
+    depth: Array
+    """Effective depth of the centroid [m], shape (ntri,); negative above the sand."""
+    stress: Array
+    """Traction [Pa], shape (ntri, 3)."""
+    active: "np.ndarray[tuple[int], np.dtype[np.bool_]]"
+    """Submerged and leading, shape (ntri,)."""
+
+
+class Instance(NamedTuple):
+    """A bed of sand in a compiled model."""
+
+    id: int
+    """Plugin instance."""
+    name: str
+    sand: Array
+    """Packed sand, `layout.SAND_FIELDS`; a view of the model's numeric_data, so a write changes the sand."""
+    bodies: dict[int, Array]
+    """Packed surface of each body that feels it, by body id; a view."""
+
+
+def instances(model: mujoco.MjModel) -> list[Instance]:
+    """The beds of sand in a model."""
+    by_name = {model.numeric(i).name: i for i in range(model.nnumeric)}
+    found: dict[int, dict[int, Array]] = {}
+    for body in np.flatnonzero(model.body_plugin >= 0):
+        numeric = _marked(by_name, BODY_MARKER, model.body(int(body)).name)
+        if numeric is not None:
+            found.setdefault(int(model.body_plugin[body]), {})[int(body)] = _surface(model, numeric)
+    beds = []
+    for instance, bodies in found.items():
+        name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_PLUGIN, instance)
+        numeric = _marked(by_name, SAND_MARKER, name)
+        assert numeric is not None, "MuJoCo would not have made data for a bed without its sand"
+        beds.append(Instance(instance, name, _numeric(model, numeric), bodies))
+    return beds
+
+
+def _marked(by_name: dict[str, int], marker: str, owner: str) -> int | None:
+    for start in range(len(owner) + 1):
+        numeric = by_name.get(owner[:start] + marker + owner[start:])
+        if numeric is not None:
+            return numeric
+    return None
+
+
+def _numeric(model: mujoco.MjModel, i: int) -> Array:
+    start = int(model.numeric_adr[i])
+    view: Array = model.numeric_data[start : start + int(model.numeric_size[i])]
+    return view
+
+
+def _surface(model: mujoco.MjModel, i: int) -> Array:
+    """A packed surface, which goes on behind its first numeric."""
+    start = int(model.numeric_adr[i])
+    header = model.numeric_data[start : start + layout.HEADER]
+    view: Array = model.numeric_data[start : start + layout.size_of(header)]
+    return view
+
+
+def wrenches(model: mujoco.MjModel, data: mujoco.MjData) -> Wrenches:
+    """Force and moment of the sand on each body, as found in the last mj_forward or mj_step of `data`.
+
+    The explicit force is applied as it is. The implicit one is that at the end of the step, or its mean over the parts
+    of a split one; what MuJoCo is handed then is the generalised force that ends the step in the same place.
+    """
+    force, moment = np.zeros((model.nbody, 3)), np.zeros((model.nbody, 3))
+    for bed in instances(model):
+        for body, wrench in read_wrenches(int(data.plugin_data[bed.id]), data._address, bed.id):
+            force[body], moment[body] = wrench[:3], wrench[3:]
+    velocity, omega = body_velocities(model, data)
+    return Wrenches(force, moment, np.einsum("ij,ij->i", force, velocity) + np.einsum("ij,ij->i", moment, omega))
+
+
+def tractions(model: mujoco.MjModel, data: mujoco.MjData, body: "int | str") -> Tractions:
+    """The sand on each triangle of a body, at the positions and velocities of the last mj_forward or mj_step.
+
+    Raises:
+        SceneError: The body does not feel sand.
+    """
+    index = model.body(body).id
+    for bed in instances(model):
+        if index in bed.bodies:
+            break
+    else:
+        raise SceneError(f"body {model.body(index).name!r} does not feel sand")
+    surface = bed.bodies[index]
+    velocity, omega = body_velocities(model, data)
+    rotation = data.xmat[index].reshape(3, 3)
+    stress, depth = evaluate.tractions(
+        bed.sand, surface, data.xpos[index], data.xmat[index], velocity[index], omega[index]
+    )
+    *columns, area = layout.read_columns(surface)
+    centre, normal = np.array(columns[:3]).T, np.array(columns[3:]).T
+    return Tractions(
+        centre=centre @ rotation.T + data.xpos[index],
+        normal=normal @ rotation.T,
+        area=area,
+        depth=depth,
+        stress=stress @ rotation.T,
+        active=(depth > 0.0) & stress.any(axis=1),
+    )
+
+
+def body_velocities(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[Array, Array]:
+    """Velocity of each body's origin and angular velocity, world frame, (nbody, 3) each."""
+    omega = data.cvel[:, :3]  # MuJoCo's cvel: angular first
+    arm = data.xpos - data.subtree_com[model.body_rootid]
+    return data.cvel[:, 3:] + np.cross(omega, arm), omega
+
+
+class Work(NamedTuple):
+    """What the implicit force has cost since the data was made or reset."""
+
+    steps: int
+    evaluations: int
+    """Evaluations of every body's force."""
+    jacobians: int
+    """Evaluations of its derivative, each worth about four of the force."""
+    unsolved: int
+    """Equations whose solution stayed outside the tolerance; the best found was taken."""
+
+
+def work(model: mujoco.MjModel, data: mujoco.MjData) -> Work:
+    """The cost of the sand so far, summed over the beds."""
+    totals = np.zeros(4, dtype=int)
+    for bed in instances(model):
+        totals += np.array(read_counters(int(data.plugin_data[bed.id]), data._address, bed.id), dtype=int)
+    steps, *costs = totals.tolist()
+    return Work(steps, *costs)

@@ -1,0 +1,1 @@
+"""The fewest elements that keep a body's wrench."""

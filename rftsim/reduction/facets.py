@@ -1,0 +1,97 @@
+"""Facets: neighbouring triangles of like normals that the sand feels as one.
+
+A law sees of a triangle only its centroid, its normal and its area, so what stands for several triangles need not be
+part of a mesh. A facet has the sum of their area vectors; so a closed surface stays closed, sum n A = 0.
+"""
+
+import dataclasses
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rftsim.surface.triangles import Array, Surface
+
+Labels = NDArray[np.intp]
+
+TURN: Final = 0.25
+"""How far two normals' difference counts against two centroids', which count in body sizes; found by trial."""
+ROUNDS: Final = 2
+"""Rounds in which triangles change to the nearest cluster."""
+
+
+def features(surface: Surface, nearness: Array) -> Array:
+    """Points whose distance says how unlike two triangles are to the sand, (ntri, 6).
+
+    Args:
+        surface: The triangles.
+        nearness: Symmetric, (3, 3); how far two centroids lie apart to the sand is |nearness (c1 - c2)|.
+    """
+    return np.hstack([surface.centres @ nearness / surface.size, TURN * surface.normals])
+
+
+def split(labels: Labels, chosen: Labels, points: Array, weights: Array) -> Labels:
+    """Labels after each chosen cluster was cut in two across its longest principal axis, where it can be.
+
+    Args:
+        labels: The cluster of each point, 0 to n - 1, (npoint,).
+        chosen: Clusters.
+        points: (npoint, k).
+        weights: (npoint,).
+    """
+    labels = labels.copy()
+    order = np.argsort(labels, kind="stable")
+    ends = np.cumsum(np.bincount(labels))
+    fresh = len(ends)
+    for cluster in chosen:
+        part = order[ends[cluster - 1] if cluster else 0 : ends[cluster]]
+        apart = points[part] - np.average(points[part], axis=0, weights=weights[part])
+        axis = np.linalg.eigh((weights[part, None] * apart).T @ apart)[1][:, -1]
+        ahead = apart @ axis > 1e-12
+        if ahead.any() and not ahead.all():
+            labels[part[ahead]] = fresh
+            fresh += 1
+    return labels
+
+
+def settled(labels: Labels, points: Array, weights: Array) -> Labels:
+    """Labels after each point went to the cluster of the nearest mean, ROUNDS times."""
+    from scipy.spatial import cKDTree  # not at start-up, which it would slow by half a second
+
+    for _ in range(ROUNDS):
+        weight = np.bincount(labels, weights)
+        means = np.column_stack([np.bincount(labels, weights * column) for column in points.T]) / weight[:, None]
+        labels = np.unique(cKDTree(means).query(points)[1], return_inverse=True)[1]
+    return labels
+
+
+def merged(surface: Surface, labels: Labels) -> Surface:
+    """One facet for each cluster: its area vector, at its centre of area, shifted so that the volume stays.
+
+    A facet is kept as an equilateral triangle of its centroid, normal and area. Those without an area, which hold both
+    sides of a plate, are kept too, as triangles of next to no area.
+    """
+    vectors, areas, centres = surface.normals * surface.areas[:, None], surface.areas, surface.centres
+
+    def summed(values: Array) -> Array:
+        return np.column_stack([np.bincount(labels, column) for column in values.T])
+
+    vector, middle = summed(vectors), summed(areas[:, None] * centres) / np.bincount(labels, areas)[:, None]
+    area = np.maximum(np.linalg.norm(vector, axis=1), 1e-15 * areas.sum())
+    normal = np.where(area[:, None] > 1e-14 * areas.sum(), vector / area[:, None], [0.0, 0.0, 1.0])
+    volume = np.bincount(labels, np.einsum("ij,ij->i", centres, vectors))  # three times that of the cone to the origin
+    lacking = volume - np.einsum("ij,ij->i", middle, vector)
+    flat = area > 1e-3 * np.bincount(labels, areas)
+    centre = middle + np.where(flat[:, None], normal * (lacking / area)[:, None], 0.0)
+    return dataclasses.replace(surface, triangles=_equilateral(centre, normal, area), outline=surface.corners)
+
+
+def _equilateral(centres: Array, normals: Array, areas: Array) -> Array:
+    """Equilateral triangles, (n, 3, 3), counter-clockwise about their normals."""
+    aside = np.eye(3)[np.argmin(np.abs(normals), axis=1)]
+    first = np.cross(normals, aside)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    second = np.cross(normals, first)
+    radius = np.sqrt(areas / (0.75 * np.sqrt(3.0)))[:, None]
+    angles = 2 * np.pi / 3 * np.arange(3)
+    return np.stack([centres + radius * (np.cos(a) * first + np.sin(a) * second) for a in angles], axis=1)

@@ -1,0 +1,1 @@
+"""Scenes that come with rftsim, and running them or somebody's model."""

@@ -1,0 +1,81 @@
+"""The demonstration: the wheel and the runner of [Agarwal] chapter 4 over their rates, under four laws."""
+
+import concurrent.futures
+import math
+import multiprocessing
+from collections.abc import Callable
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from rftsim.run.run import STEADY, run
+from rftsim.run.scenes import stage
+
+LAWS: Final = ("rft2d", "drft2d", "rft3d", "drft3d")
+RATES: Final = {
+    "grouser-wheel": (10, 30, 45, 60, 75, 90),
+    "four-flap-runner": (20, 60, 100, 150, 200, 300),
+}
+"""Imposed rates of each scene [revolutions per minute]."""
+SHORTEST: Final = 3.0
+"""Simulated time of a run [s], at least."""
+
+
+class Point(NamedTuple):
+    """One run of the demonstration, in the thesis's dimensionless numbers."""
+
+    scene: str
+    law: str
+    rpm: float
+    spin: float
+    """omega / sqrt(g / l), l the outer diameter."""
+    speed: float
+    """v / sqrt(g l)."""
+    sinkage: float
+    """Sinkage over l."""
+    slip: float
+    realtime_factor: float
+
+
+def points() -> list[tuple[str, str, float]]:
+    """Every (scene, law, rpm) of the demonstration, longest runs first."""
+    return [(scene, law, rpm) for scene, rates in RATES.items() for rpm in rates for law in LAWS]
+
+
+def measure(scene: str, law: str, rpm: float, sand: str | None = None) -> Point:
+    """Run one point, on other sand than the scene's if so asked."""
+    turn = 60 / rpm
+    averaged = max(math.ceil(SHORTEST * STEADY / turn), 1) * turn  # whole turns, so that no lug counts twice
+    staged = stage(scene, sand=sand, law=law, settings={"rpm": str(rpm)}, duration=averaged / STEADY)
+    finished = run(staged)
+    radius = staged.measured.wheel_radius
+    assert radius is not None, "the demonstration's scenes are wheels"
+    g, length = float(np.linalg.norm(staged.model.opt.gravity)), 2 * radius
+    steady = finished.steady
+    return Point(
+        scene,
+        law,
+        rpm,
+        spin=steady.rate / math.sqrt(g / length),
+        speed=steady.speed / math.sqrt(g * length),
+        sinkage=steady.sinkage / length,
+        slip=steady.slip if steady.slip is not None else math.nan,
+        realtime_factor=finished.realtime_factor,
+    )
+
+
+def measure_all(processes: int, report: Callable[[Point], None]) -> list[Point]:
+    """Run every point, `processes` at a time; `report` is called as each ends."""
+    context = multiprocessing.get_context("spawn")
+    jobs = points()
+    with concurrent.futures.ProcessPoolExecutor(processes, mp_context=context) as pool:
+        futures = {pool.submit(measure, *job): job for job in jobs}
+        done = {}
+        try:
+            for future in concurrent.futures.as_completed(futures):
+                done[futures[future]] = future.result()
+                report(done[futures[future]])
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+    return [done[job] for job in jobs]

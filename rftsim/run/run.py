@@ -1,0 +1,170 @@
+"""Running a staged scene: steps, what is measured on the way, and the steady state."""
+
+import time
+from collections.abc import Callable, Generator
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+
+from rftsim.errors import RftsimError
+from rftsim.model.readout import work, wrenches
+from rftsim.run.scenes import Staged
+from rftsim.run.validity import Validity, validity
+from rftsim.surface.triangles import Array
+
+STEADY = 0.4
+"""Share of a run, at its end, that counts as its steady state."""
+SAMPLES = 500
+"""Samples that a run keeps."""
+_CHECKS = 10
+
+
+class History(NamedTuple):
+    """What was measured, at evenly spaced times; arrays of shape (n,) unless said."""
+
+    time: Array
+    """[s]."""
+    speed: Array
+    """Horizontal speed of the measured body, along x [m/s]."""
+    sinkage: Array
+    """Of the measured body [m]: outer radius less axle height for a wheel, depth of the deepest corner otherwise."""
+    rate: Array
+    """Angular velocity of the measured body about y [rad/s]."""
+    force: Array
+    """Force of the sand on the measured body [N], shape (n, 3)."""
+    power: Array
+    """Power of the sand on all bodies [W]."""
+
+
+class Steady(NamedTuple):
+    """Means over the last 40 % of a run."""
+
+    speed: float
+    """[m/s]."""
+    sinkage: float
+    """[m]."""
+    slip: float | None
+    """1 - v / (R omega) of a wheel; None elsewhere, or where it does not turn."""
+    rate: float
+    """[rad/s]."""
+
+
+class Run(NamedTuple):
+    """A finished run."""
+
+    history: History
+    steady: Steady
+    realtime_factor: float
+    """Simulated over elapsed time, of the steps alone."""
+    doubts: tuple[str, ...]
+    """Where the run left the theory's range, with numbers."""
+    last: mujoco.MjData
+    """The data at the end."""
+
+
+class RunError(RftsimError):
+    """A run that MuJoCo could not continue."""
+
+
+def run(staged: Staged, observe: Callable[[mujoco.MjData], Any] | None = None) -> Run:
+    """Run a staged scene from its first keyframe, or from its initial state.
+
+    Args:
+        staged: The scene.
+        observe: Called with the data after each sample.
+
+    Raises:
+        RunError: The simulation diverged; MuJoCo would have reset it silently.
+    """
+    runner = steps(staged)
+    while True:
+        try:
+            data = next(runner)
+        except StopIteration as end:
+            finished: Run = end.value
+            return finished
+        if observe is not None:
+            observe(data)
+
+
+def steps(staged: Staged) -> Generator[mujoco.MjData, None, Run]:
+    """The run as an iterator over its samples, whose return value is the `Run`."""
+    model, bed, measured = staged.model, staged.bed, staged.measured
+    data = mujoco.MjData(model)
+    if model.nkey:
+        mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_forward(model, data)
+    body = model.body(measured.body).id
+    corners = bed.surfaces[measured.body].corners
+    total = max(round(staged.duration / model.opt.timestep), 1)
+    every = max(total // SAMPLES, 1)
+    rows: list[tuple[Any, ...]] = []
+    checks: list[Validity] = []
+    elapsed = 0.0
+    for first in range(0, total, every):
+        started = time.perf_counter()
+        mujoco.mj_step(model, data, nstep=min(every, total - first))
+        elapsed += time.perf_counter() - started
+        _refuse_warnings(data)
+        rows.append(
+            _row(model, data, body, measured.wheel_radius, corners, bed.free_surface.normal, bed.free_surface.offset)
+        )
+        if (first // every) % max(SAMPLES // _CHECKS, 1) == 0:
+            checks += validity(model, data, bed.sand.grain_diameter)
+        yield data
+    columns = [np.array(column) for column in zip(*rows, strict=True)]
+    history = History(*columns)
+    doubts = _worst(checks)
+    spent = work(model, data)
+    if spent.unsolved:
+        doubts.append(
+            f"{spent.unsolved} equations of the implicit force in {spent.steps} steps were not solved to their "
+            f"tolerance: compare with a shorter timestep than {model.opt.timestep:g} s"
+        )
+    steady = _steady(history, measured.wheel_radius)
+    return Run(history, steady, staged.duration / elapsed, tuple(dict.fromkeys(doubts)), data)
+
+
+def _row(
+    model: mujoco.MjModel, data: mujoco.MjData, body: int, radius: float | None, corners: Array, up: Any, offset: float
+) -> tuple[Any, ...]:
+    wrench = wrenches(model, data)
+    velocity = np.empty(6)
+    mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_XBODY, body, velocity, 0)
+    height = float(np.dot(up, data.xpos[body])) - offset
+    if radius is None:
+        lowest = float((corners @ data.xmat[body].reshape(3, 3).T @ np.asarray(up)).min())
+        sinkage = -(height + lowest)
+    else:
+        sinkage = radius - height
+    return data.time, velocity[3], sinkage, velocity[1], wrench.force[body].copy(), float(wrench.power.sum())
+
+
+def _steady(history: History, radius: float | None) -> Steady:
+    last = slice(int(len(history.time) * (1 - STEADY)), None)
+    speed, sinkage, rate = (float(np.mean(x[last])) for x in (history.speed, history.sinkage, history.rate))
+    slip = None if radius is None or rate == 0.0 else 1.0 - speed / (radius * rate)
+    return Steady(speed, sinkage, slip, rate)
+
+
+def _refuse_warnings(data: mujoco.MjData) -> None:
+    for kind in ("mjWARN_BADQPOS", "mjWARN_BADQVEL", "mjWARN_BADQACC", "mjWARN_BADCTRL"):
+        if data.warning[getattr(mujoco.mjtWarning, kind)].number:
+            raise RunError(
+                f"the simulation diverged by {data.time:.4g} s ({kind[7:].lower()}): take a smaller timestep"
+            )
+
+
+def _worst(checks: list[Validity]) -> list[str]:
+    """The doubts about each body at its worst moments."""
+    found = []
+    for name in dict.fromkeys(check.body for check in checks):
+        own = [check for check in checks if check.body == name]
+        worst = own[0]._replace(
+            froude=max(check.froude for check in own),
+            inertial=max((check.inertial for check in own if check.inertial == check.inertial), default=float("nan")),
+            depth=max(check.depth for check in own),
+        )
+        found += worst.doubts()
+    return found

@@ -1,0 +1,209 @@
+"""Scenes that come with rftsim: a model, the sand under it, and what is measured of it."""
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import mujoco
+from rftsim_models import intruder, wheels
+
+from rftsim.errors import SceneError
+from rftsim.model.add_sand import Bed, add_sand, read_spec
+from rftsim.sand.medium import Sand
+from rftsim.sand.presets import PRESETS
+from rftsim.surface.triangles import Wheel, load_surface
+
+Settings = Mapping[str, float | str]
+
+
+class Measured(NamedTuple):
+    """What a scene is measured by."""
+
+    body: str
+    """The body whose speed and sinkage are meant."""
+    wheel_radius: float | None
+    """Outer radius where the body is a wheel about y [m]: its sinkage is then radius less axle height, and it slips."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Scene:
+    """A shipped scene.
+
+    Attributes:
+        says: What it is.
+        settings: What `--set` changes, with defaults.
+        build: Makes the model from the settings.
+        sand: Its sand.
+        law: Its law.
+        duration: How long it runs [s].
+        wheel: Parameters of its wheel, if it has one, from the settings.
+        structural: Whether the free surface drops behind the wheel under the dynamic laws.
+    """
+
+    says: str
+    settings: Settings
+    build: Callable[[Settings], mujoco.MjSpec]
+    sand: Sand
+    law: str
+    duration: float
+    wheel: Callable[[Settings], wheels.WheelParameters] | None = None
+    structural: bool = False
+
+
+class Staged(NamedTuple):
+    """A scene ready to run."""
+
+    model: mujoco.MjModel
+    bed: Bed
+    measured: Measured
+    duration: float
+
+
+def _grouser_wheel(settings: Settings) -> wheels.WheelParameters:
+    return dataclasses.replace(wheels.GROUSER_WHEEL, felt_height=float(settings["felt_height"]))
+
+
+def _half_wheel(settings: Settings) -> wheels.WheelParameters:
+    return dataclasses.replace(wheels.HALF_GROUSER_WHEEL, felt_height=float(settings["felt_height"]))
+
+
+def _runner(settings: Settings) -> wheels.WheelParameters:
+    return wheels.FOUR_FLAP_RUNNER
+
+
+def _wheel_scene(
+    says: str, parameters: Callable[[Settings], wheels.WheelParameters], settings: Settings, **rest: Any
+) -> Scene:
+    def build(chosen: Settings) -> mujoco.MjSpec:
+        return wheels.build_wheel(parameters(chosen), float(chosen["rpm"]))
+
+    return Scene(says=says, settings=settings, build=build, wheel=parameters, **rest)
+
+
+def _intruder(settings: Settings) -> mujoco.MjSpec:
+    if settings["mesh"] == "sphere":
+        import trimesh  # not at start-up, which it would slow by a second
+
+        mesh = trimesh.creation.icosphere(subdivisions=3, radius=0.05)
+        vertices, faces = mesh.vertices, mesh.faces
+    else:
+        surface = load_surface(str(settings["mesh"]), scale=float(settings["scale"]))
+        vertices, faces = surface.triangles.reshape(-1, 3), range(3 * surface.ntri)
+    numbers = {name: float(settings[name]) for name in ("density", "height", "speed", "rate")}
+    return intruder.build_intruder(vertices, list(faces), motion=settings["motion"], **numbers)  # type: ignore[arg-type]
+
+
+POPPY: Final = PRESETS["poppy-seeds"]
+
+SCENES: Final[Mapping[str, Scene]] = {
+    "grouser-wheel": _wheel_scene(
+        "[Agarwal] Table 4.1: grousered wheel on a gravity-compensated carriage, 4 N forward, rate imposed",
+        _grouser_wheel,
+        {"rpm": 60.0, "felt_height": 1 / 3},
+        sand=POPPY,
+        law="drft2d",
+        duration=4.0,
+        structural=True,
+    ),
+    "half-grouser-wheel": _wheel_scene(
+        "[Agarwal] appendix B.1: the same at half the size",
+        _half_wheel,
+        {"rpm": 90.0, "felt_height": 1 / 3},
+        sand=POPPY,
+        law="drft2d",
+        duration=4.0,
+        structural=True,
+    ),
+    "four-flap-runner": _wheel_scene(
+        "[Agarwal] Table 4.3: four-flap runner, rate imposed, lambda 4",
+        _runner,
+        {"rpm": 100.0},
+        sand=POPPY.replace(lambda_=4.0),
+        law="drft2d",
+        duration=4.0,
+    ),
+    "intruder": Scene(
+        "a mesh dropped, dragged or drilled: motion=drop|drag|drill, mesh=FILE",
+        {"mesh": "sphere", "scale": 1.0, "motion": "drop", "density": 1500.0, "height": 0.1, "speed": 0.1, "rate": 0.0},
+        _intruder,
+        sand=POPPY,
+        law="rft3d",
+        duration=1.0,
+    ),
+}
+"""Every shipped scene by name."""
+
+
+def stage(
+    name: str,
+    *,
+    sand: "Sand | str | None" = None,
+    law: str | None = None,
+    settings: Mapping[str, str] | None = None,
+    timestep: float | None = None,
+    duration: float | None = None,
+    **options: Any,
+) -> Staged:
+    """A shipped scene, or somebody's MJCF, with its sand, compiled.
+
+    Args:
+        name: A scene's name, or the path of an MJCF file.
+        sand: Instead of the scene's.
+        law: Instead of the scene's.
+        settings: Changes of the scene's settings.
+        timestep: Instead of the model's [s].
+        duration: Instead of the scene's [s].
+        **options: Those of `add_sand`.
+
+    Raises:
+        RftsimError: No such scene, file or setting, or the scene cannot have sand.
+    """
+    scene = SCENES.get(name)
+    if scene is None and not Path(name).is_file():
+        raise SceneError(f"no scene or model file {name!r}; scenes are {', '.join(SCENES)}")
+    wheel = None
+    if scene is None:
+        if settings:
+            raise SceneError(f"{name} is a model file and has no settings; --set is for {', '.join(SCENES)}")
+        spec = read_spec(name)
+    else:
+        chosen = _chosen(name, scene.settings, settings or {})
+        try:
+            spec = scene.build(chosen)
+            wheel = scene.wheel(chosen) if scene.wheel else None
+        except ValueError as error:
+            raise SceneError(f"{name}: {error}") from error
+        if wheel is not None:
+            options.setdefault("max_edge", 2 * wheel.width)  # as fine as the outline was asked to be
+            if scene.structural:
+                options["wheels"] = {wheels.WHEEL: Wheel((0, 1, 0), (0, 0, 0), wheel.outer_radius)}
+    for label, value in (("timestep", timestep), ("duration", duration)):
+        if value is not None and not 0.0 < value < float("inf"):
+            raise SceneError(f"the {label} must be positive, not {value}")
+    if timestep is not None:
+        spec.option.timestep = timestep
+    fallback = scene or Scene("", {}, lambda _: spec, POPPY, "rft3d", 4.0)
+    bed = add_sand(spec, sand if sand is not None else fallback.sand, law or fallback.law, **options)
+    model = spec.compile()
+    if scene is None:
+        measured = Measured(next(iter(bed.surfaces)), None)
+    else:
+        body = wheels.WHEEL if wheel else intruder.INTRUDER
+        measured = Measured(body, wheel.outer_radius if wheel else None)
+    return Staged(model, bed, measured, duration or fallback.duration)
+
+
+def _chosen(name: str, defaults: Settings, changes: Mapping[str, str]) -> Settings:
+    chosen = dict(defaults)
+    for key, value in changes.items():
+        if key not in defaults:
+            raise SceneError(f"{name} has no setting {key!r}; it has {', '.join(defaults)}")
+        if isinstance(defaults[key], str):
+            chosen[key] = value
+            continue
+        try:
+            chosen[key] = float(value)
+        except ValueError:
+            raise SceneError(f"{name}: {key} must be a number, not {value!r}") from None
+    return chosen

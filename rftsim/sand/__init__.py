@@ -1,0 +1,5 @@
+"""Sand: its parameters, presets, and the free surface."""
+
+from rftsim.sand.free_surface import FreeSurface
+from rftsim.sand.medium import Sand
+from rftsim.sand.presets import PRESETS, make_sand

@@ -1,0 +1,309 @@
+"""The surface of a body as the sand sees it: triangles, checked closed and outward."""
+
+import dataclasses
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rftsim.errors import SurfaceError
+from rftsim.surface.splitting import split
+
+Array = NDArray[np.float64]
+Faces = NDArray[np.integer[Any]]
+
+EDGE_ON_DOUBLE: Final = 1e-9
+EDGE_ON_SINGLE: Final = 1e-6
+"""Leading-edge tolerance on n.v_hat: rounding of normals computed in double, or from MuJoCo's single precision."""
+
+LARGEST: Final = 20.0
+SMALLEST: Final = 1e-3
+"""Body sizes [m] outside of which a mesh is suspected to be in other units."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Wheel:
+    """What the structural term needs to know of a driven wheel; in the body frame.
+
+    Attributes:
+        axis: Axis of rotation, a unit vector; positive spin about it rolls the wheel along axis x up.
+        centre: A point on the axis [m].
+        radius: Outer radius r of delta h = r (r omega^2 / g) [m].
+    """
+
+    axis: tuple[float, float, float]
+    centre: tuple[float, float, float]
+    radius: float
+
+    def __post_init__(self) -> None:
+        length = float(np.linalg.norm(self.axis))
+        if not (0.0 < length < np.inf and 0.0 < self.radius < np.inf and np.isfinite(self.centre).all()):
+            raise ValueError(f"a wheel needs an axis and a positive radius, not {self.axis} and {self.radius}")
+        object.__setattr__(self, "axis", tuple(float(a) / length for a in self.axis))
+
+
+@dataclasses.dataclass(frozen=True)
+class Surface:
+    """Triangles that the sand can press on, in the body frame.
+
+    Attributes:
+        triangles: Corners [m], shape (ntri, 3, 3), counter-clockwise seen from outside.
+        edge_on: Leading-edge tolerance: n.v_hat down to minus this counts as leading.
+        wheel: Set where the body is a wheel to the structural term.
+        notes: What was found and repaired, one sentence each.
+        outline: Where the triangles stand for others, corners of those [m], shape (npoint, 3).
+    """
+
+    triangles: Array
+    edge_on: float = EDGE_ON_DOUBLE
+    wheel: Wheel | None = None
+    notes: tuple[str, ...] = ()
+    outline: Array | None = None
+    centres: Array = dataclasses.field(init=False)
+    """Centroids [m], shape (ntri, 3)."""
+    normals: Array = dataclasses.field(init=False)
+    """Outward unit normals, shape (ntri, 3)."""
+    areas: Array = dataclasses.field(init=False)
+    """Areas [m^2], shape (ntri,)."""
+
+    def __post_init__(self) -> None:
+        a, b, c = np.moveaxis(self.triangles, 1, 0)
+        cross = np.cross(b - a, c - a)
+        double = np.linalg.norm(cross, axis=1)
+        object.__setattr__(self, "centres", (a + b + c) / 3.0)
+        object.__setattr__(self, "normals", cross / double[:, None])
+        object.__setattr__(self, "areas", double / 2.0)
+
+    @property
+    def ntri(self) -> int:
+        """Number of triangles."""
+        return len(self.areas)
+
+    @property
+    def corners(self) -> Array:
+        """Points that span the body [m], shape (npoint, 3)."""
+        return self.triangles.reshape(-1, 3) if self.outline is None else self.outline
+
+    @property
+    def size(self) -> float:
+        """Largest extent along an axis [m]."""
+        return float(np.ptp(self.corners, axis=0).max())
+
+    def moved(self, rotation: ArrayLike, translation: ArrayLike) -> "Surface":
+        """The surface after x -> rotation x + translation."""
+        r, t = np.asarray(rotation), np.asarray(translation)
+        wheel = self.wheel
+        if wheel is not None:
+            wheel = Wheel(tuple((r @ wheel.axis).tolist()), tuple((r @ wheel.centre + t).tolist()), wheel.radius)
+        outline = None if self.outline is None else self.outline @ r.T + t
+        return dataclasses.replace(self, triangles=self.triangles @ r.T + t, wheel=wheel, outline=outline)
+
+    def clustered(self, size: int) -> "Surface":
+        """The surface with its triangles in an order where each `size` of them lie close together."""
+        parts, order = [np.arange(self.ntri)], []
+        while parts:
+            part = parts.pop()
+            if len(part) <= size:
+                order.append(part)
+                continue
+            axis = int(np.argmax(np.ptp(self.centres[part], axis=0)))
+            part = part[np.argsort(self.centres[part, axis], kind="stable")]
+            middle = size * ((len(part) // 2 + size - 1) // size)
+            parts += [part[middle:], part[:middle]]
+        return dataclasses.replace(self, triangles=self.triangles[np.concatenate(order)])
+
+    def refined(self, max_edge: float) -> "Surface":
+        """The surface with its triangles split until no edge exceeds max_edge [m]."""
+        if not max_edge > 0.0:
+            raise ValueError(f"max_edge must be positive, not {max_edge:g}")
+        return dataclasses.replace(self, triangles=split(self.triangles, max_edge))
+
+
+def joined(surfaces: "list[Surface]") -> Surface:
+    """Several surfaces of one body as one."""
+    return Surface(
+        triangles=np.concatenate([s.triangles for s in surfaces]),
+        edge_on=max(s.edge_on for s in surfaces),
+        notes=tuple(note for s in surfaces for note in s.notes),
+    )
+
+
+def make_surface(
+    vertices: ArrayLike,
+    faces: ArrayLike,
+    *,
+    name: str = "mesh",
+    allow_open: bool = False,
+    edge_on: float = EDGE_ON_DOUBLE,
+) -> Surface:
+    """A checked surface from vertices [m], (nvert, 3), and faces, (nface, 3).
+
+    Faces of no area and repeated faces are dropped, inconsistent or inward winding is turned; each is noted.
+
+    Raises:
+        SurfaceError: No faces, a vertex that is not finite, or a surface that is not closed (unless allow_open).
+    """
+    points = np.asarray(vertices, dtype=float).reshape(-1, 3)
+    corners = np.asarray(faces, dtype=int).reshape(-1, 3)
+    if not len(corners):
+        raise SurfaceError(f"{name} has no faces; the sand needs a closed triangle mesh")
+    if corners.min() < 0 or corners.max() >= len(points):
+        wrong = corners.min() if corners.min() < 0 else corners.max()
+        raise SurfaceError(f"{name}: a face refers to vertex {wrong}; vertices are 0 to {len(points) - 1}")
+    bad = ~np.isfinite(points[corners]).all(axis=(1, 2))
+    if bad.any():
+        raise SurfaceError(f"{name}: face {int(np.argmax(bad))} has a vertex that is not finite")
+    notes: list[str] = []
+    points, corners = _merged(points, corners)
+    extent = float(np.linalg.norm(np.ptp(points, axis=0)))
+    areas = np.linalg.norm(np.cross(*_edges(points[corners])), axis=1) / 2.0
+    corners = _kept(corners, areas > 1e-14 * extent**2, f"{name}: dropped %d faces of no area", notes)
+    unique = np.zeros(len(corners), dtype=bool)
+    unique[_distinct(np.sort(corners, axis=1))[0]] = True
+    corners = _kept(corners, unique, f"{name}: dropped %d repeated faces", notes)
+    if not len(corners):
+        raise SurfaceError(f"{name} has no face with an area; the sand needs a closed triangle mesh")
+    corners = _wound(points, corners, name, notes)
+    open_face = _open_face(corners)
+    if open_face is not None:
+        near = _point(points[corners[open_face]].mean(axis=0))
+        text = f"{name} is open at face {open_face} of {len(corners)}, near {near}"
+        if not allow_open:
+            raise SurfaceError(f"{text}: close it, or allow open meshes (then only its outer side is felt)")
+        notes.append(text)
+    size = float(np.ptp(points, axis=0).max())
+    if not SMALLEST <= size <= LARGEST:
+        notes.append(
+            f"{name} is {size:g} m in size; lengths are in metres"
+            + (f": a mesh in millimetres needs scale 0.001 ({size / 1000:g} m)" if size > LARGEST else "")
+        )
+    return Surface(points[corners], edge_on=edge_on, notes=tuple(notes))
+
+
+def load_surface(path: "str | Path", *, scale: float = 1.0, allow_open: bool = False) -> Surface:
+    """A checked surface from a mesh file of any kind that trimesh reads.
+
+    Raises:
+        SurfaceError: The file is missing, is not a mesh, or does not bound a body.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise SurfaceError(f"no mesh file {path}")
+    if not (np.isfinite(scale) and scale > 0.0):
+        raise SurfaceError(f"the mesh scale must be positive, not {scale:g}")
+    import trimesh  # not at start-up, which it would slow by a second
+
+    try:
+        mesh = trimesh.load_mesh(path, process=False)
+    except Exception as error:  # trimesh's readers raise whatever their parsers raise
+        raise SurfaceError(f"cannot read the mesh {path}: {type(error).__name__}: {error}") from error
+    if not isinstance(mesh, trimesh.Trimesh):
+        raise SurfaceError(f"{path} holds no triangle mesh")
+    return make_surface(mesh.vertices * scale, mesh.faces, name=path.name, allow_open=allow_open)
+
+
+def _point(x: ArrayLike) -> str:
+    return "(" + ", ".join(f"{value:.4g}" for value in np.asarray(x)) + ")"
+
+
+def _merged(points: Array, faces: Faces) -> tuple[Array, Faces]:
+    """Vertices that faces have, none twice, to 1e-8, and the faces on them."""
+    used, faces = np.unique(faces, return_inverse=True)
+    points = points[used]
+    first, same = _distinct(np.round(points * 1e8).astype(np.int64))
+    return points[first], same[faces].reshape(-1, 3)
+
+
+def _distinct(rows: Faces) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Where each distinct row of integers is first, and which of these each row is."""
+    first, same = np.zeros(1, dtype=int), np.zeros(len(rows), dtype=int)
+    for column in rows.T:
+        value = np.unique(column, return_inverse=True)[1]
+        _, first, same = np.unique(same * (value.max(initial=0) + 1) + value, return_index=True, return_inverse=True)
+    return first, same
+
+
+def _kept(faces: Faces, keep: NDArray[np.bool_], note: str, notes: list[str]) -> Faces:
+    if not keep.all():
+        notes.append(note % np.count_nonzero(~keep))
+    return faces[keep]
+
+
+def _wound(points: Array, before: Faces, name: str, notes: list[str]) -> Faces:
+    """Make the winding consistent and outward, and drop shells that lie inside another: no sand reaches them."""
+    faces = before.copy()
+    if _open_face(faces) is not None:
+        import trimesh  # not at start-up, which it would slow by a second
+
+        mesh = trimesh.Trimesh(points, faces, process=False)
+        trimesh.repair.fix_winding(mesh)
+        faces = np.array(mesh.faces)
+    labels = _shells(faces)
+    triangles = points[faces]
+    shells = [np.flatnonzero(labels == label) for label in np.unique(labels)]
+    enclosed = np.zeros(len(faces), dtype=bool)
+    for shell in shells:
+        others = [other for other in shells if other is not shell]
+        point = triangles[shell[0], 0]
+        enclosed[shell] = any(abs(_winding_number(triangles[other], point)) > 0.5 for other in others)
+        volume = np.einsum("ij,ij->", triangles[shell].mean(axis=1), np.cross(*_edges(triangles[shell]))) / 6.0
+        if volume < 0.0 and not enclosed[shell[0]]:
+            faces[shell] = faces[shell][:, ::-1]
+    flipped = int((_cyclic(before) != _cyclic(faces)).any(axis=1)[~enclosed].sum())
+    if flipped:
+        notes.append(f"{name}: turned {flipped} of {len(faces)} faces outward")
+    return _kept(faces, ~enclosed, f"{name}: dropped %d faces of shells inside another, which no sand reaches", notes)
+
+
+def _shells(faces: Faces) -> NDArray[np.intp]:
+    """A number for each face, the same where edges that two faces share lead from one to the other."""
+    edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    edge = _distinct(edges)[1]
+    order = np.argsort(edge, kind="stable")
+    order = order[np.bincount(edge)[edge[order]] == 2]
+    one, other = order[::2] // 3, order[1::2] // 3
+    labels = np.arange(len(faces))
+    while True:
+        least = np.minimum(labels[one], labels[other])
+        lower = labels.copy()
+        for face in (one, other):
+            np.minimum.at(lower, face, least)
+            np.minimum.at(lower, labels[face], least)
+        lower = lower[lower]
+        if (lower == labels).all():
+            return labels
+        labels = lower
+
+
+def _winding_number(triangles: Array, point: Array) -> float:
+    """How often a closed shell winds around a point: solid angles, by Van Oosterom and Strackee's formula."""
+    a, b, c = np.moveaxis(triangles - point, 1, 0)
+    la, lb, lc = (np.linalg.norm(side, axis=1) for side in (a, b, c))
+    triple = np.einsum("ij,ij->i", a, np.cross(b, c))
+    dots = (np.einsum("ij,ij->i", u, v) for u, v in ((a, b), (b, c), (c, a)))
+    ab, bc, ca = dots
+    return float(np.arctan2(triple, la * lb * lc + ab * lc + bc * la + ca * lb).sum() / (2 * np.pi))
+
+
+def _edges(triangles: Array) -> tuple[Array, Array]:
+    return triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+
+
+def _cyclic(faces: Faces) -> Faces:
+    """Faces rotated so that the smallest vertex comes first, which leaves the winding."""
+    start = np.argmin(faces, axis=1)[:, None]
+    return np.take_along_axis(faces, (start + np.arange(3)) % 3, axis=1)
+
+
+def _open_face(faces: Faces) -> int | None:
+    """A face one of whose directed edges has no opposite, or None where the surface is closed."""
+    tail, head = faces[:, [0, 1, 2]].ravel(), faces[:, [1, 2, 0]].ravel()
+    n = int(faces.max()) + 1
+    codes, counts = np.unique(np.concatenate([tail * n + head, head * n + tail]), return_counts=True)
+    forward = np.zeros(len(codes), dtype=int)
+    np.add.at(forward, np.searchsorted(codes, tail * n + head), 1)
+    unbalanced = codes[2 * forward != counts]
+    if not len(unbalanced):
+        return None
+    return int(np.argmax(np.isin(tail * n + head, unbalanced))) // 3

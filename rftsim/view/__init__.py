@@ -1,0 +1,1 @@
+"""Recordings, pictures and plots of runs."""
