@@ -27,22 +27,22 @@ class HexapodParameters:
     """A hexapod; the defaults are about SandBot's, 2.3 kg and 0.30 m long.
 
     Attributes:
-        length: Of the torso [m].
-        width: Of the torso [m].
-        height: Of the torso [m].
-        hip_spacing: Between neighbouring hips along x [m].
+        length: Length of the torso [m].
+        width: Width of the torso [m].
+        height: Height of the torso [m].
+        hip_spacing: Distance between neighbouring hips along x [m].
         stagger: How much further out the middle legs are than the others [m].
         leg_radius: Outer radius of a leg's half circle [m].
-        leg_width: Along the hinge [m].
-        leg_thickness: Of the shell [m].
-        mass: Of the whole robot [kg].
-        leg_mass: Of one leg [kg].
+        leg_width: Width of a leg along its hinge [m].
+        leg_thickness: Thickness of a leg's shell [m].
+        mass: Mass of the whole robot [kg].
+        leg_mass: Mass of one leg [kg].
         torque: Largest torque of a hip [N m].
         rate: Largest rate of a hip [rad/s].
-        gain: Of the rate servos [N m s/rad].
+        gain: Gain of the rate servos [N m s/rad].
         armature: Inertia of a motor behind its gear [kg m^2].
         friction: Torque of dry friction in a gear, which holds the robot at rest [N m].
-        segments: Of a leg's half circle.
+        segments: Number of straight segments in a leg's half circle.
     """
 
     length: float = 0.30
@@ -63,7 +63,7 @@ class HexapodParameters:
     segments: int = 7
 
     def __post_init__(self) -> None:
-        parts.positive(self, [field.name for field in dataclasses.fields(self) if field.name != "stagger"])
+        parts.check_positive(self, [field.name for field in dataclasses.fields(self) if field.name != "stagger"])
         if not self.leg_thickness < self.leg_radius:
             raise ValueError(f"leg_thickness = {self.leg_thickness} must be less than leg_radius = {self.leg_radius}")
         if not 6 * self.leg_mass < self.mass:
@@ -73,7 +73,7 @@ class HexapodParameters:
 
     @property
     def hip_height(self) -> float:
-        """Of the hips above the toes, when the legs' diameters point down [m]."""
+        """Height of the hips above the toes when the legs' diameters point down [m]."""
         return 2 * self.leg_radius - self.leg_thickness / 2
 
     def leg(self) -> tuple[Array, Faces]:

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rftsim_models.studio import furnish
+from rftsim_models.studio import new_scene
 
 Motion = Literal["drop", "drag", "drill"]
 MOTIONS: Final = get_args(Motion)
@@ -29,15 +29,15 @@ def build_intruder(
     """An intruder whose own origin starts at a height above z = 0 [m].
 
     Args:
-        vertices: Of its mesh [m], (nvert, 3).
-        faces: (nface, 3).
+        vertices: Vertices of its mesh [m], (nvert, 3).
+        faces: Triangles of its mesh, as numbers of vertices, (nface, 3).
         motion: `drop`: free; `drag`: at a speed along x, its height held; `drill`: downward at a speed, turning about
             the vertical at a rate.
-        density: [kg/m^3].
-        height: Of the mesh's origin above the ground [m].
+        density: Density of the solid [kg/m^3].
+        height: Height of the mesh's origin above the ground [m].
         speed: Imposed speed [m/s].
         rate: Imposed angular rate about the vertical [rad/s].
-        gravity: [m/s^2].
+        gravity: Acceleration along -z [m/s^2].
 
     Raises:
         ValueError: No such motion, or a density that is not positive.
@@ -46,12 +46,7 @@ def build_intruder(
         raise ValueError(f"no motion {motion!r}; motions are {', '.join(MOTIONS)}")
     if not density > 0.0:
         raise ValueError(f"density must be positive, not {density}")
-    spec = mujoco.MjSpec()
-    spec.modelname = INTRUDER
-    spec.option.gravity = [0, 0, -gravity]
-    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    spec.option.timestep = 1e-3
-    furnish(spec)
+    spec = new_scene(INTRUDER, gravity=gravity, timestep=1e-3)
     points = np.asarray(vertices, dtype=float)
     spec.add_mesh(name=INTRUDER, uservert=points.ravel(), userface=np.asarray(faces).ravel())
     body = spec.worldbody.add_body(name=INTRUDER, pos=[0, 0, height])
@@ -60,13 +55,18 @@ def build_intruder(
         body.add_freejoint(name="free")
         return spec
     slide, hinge = mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE
-    imposed = [("x", slide, [1, 0, 0], speed)]
-    if motion == "drill":
-        imposed = [("z", slide, [0, 0, 1], -speed), ("yaw", hinge, [0, 0, 1], rate)]
+    drag, sink = ("x", slide, [1, 0, 0], speed), ("z", slide, [0, 0, 1], -speed)
+    _impose(spec, body, [drag] if motion == "drag" else [sink, ("yaw", hinge, [0, 0, 1], rate)])
+    return spec
+
+
+def _impose(
+    spec: mujoco.MjSpec, body: mujoco.MjsBody, imposed: list[tuple[str, mujoco.mjtJoint, list[int], float]]
+) -> None:
+    """Give a body joints, by name, kind, axis and rate [m/s or rad/s], on stiff servos that hold these rates."""
     for name, kind, axis, _ in imposed:
         body.add_joint(name=name, type=kind, axis=axis)
         servo = spec.add_actuator(name=name, trntype=mujoco.mjtTrn.mjTRN_JOINT, target=name)
         servo.set_to_velocity(kv=SERVO)
     values = [value for *_, value in imposed]
     spec.add_key(name="start", qvel=values, ctrl=values)
-    return spec

@@ -45,7 +45,7 @@ def extruded(outline: Array, width: float, *, rings: int = 1, strips: int = 1) -
     """The solid that an outline, star-shaped about the origin, sweeps along y: vertices and outward faces.
 
     Args:
-        outline: (n, 2), x and z, counter-clockwise seen from -y.
+        outline: Its corners in x and z [m], (n, 2), counter-clockwise seen from -y.
         width: Extent along y, centred [m].
         rings: Rings of triangles in each of the two side faces.
         strips: Strips of triangles across the width.
@@ -88,7 +88,7 @@ def lofted(rings: Array) -> tuple[Array, Faces]:
     """The solid between rings of points, one after another, closed by a fan at each end: vertices and outward faces.
 
     Args:
-        rings: (rings, points, 3); the first point of each ring follows the first of the one before; [m].
+        rings: Their points [m], (nring, npoint, 3); the first of each ring follows the first of the one before.
     """
     count, n, _ = rings.shape
     hubs = rings[[0, -1]].mean(axis=1)

@@ -1,4 +1,4 @@
-"""What the robots have in common: options, felt and seen geoms, sensors, a camera, and the pose they start in.
+"""Parts that the robots share: options, felt and seen geoms, sensors, a camera, and the pose they start in.
 
 Geoms of bodies that touch the ground are meshes, as fine as the sand needs them: with `rftsim.add_sand` pass
 `max_edge=AS_MESHED`. They collide with a floor (its conaffinity 1) and not with one another, and where they are concave
@@ -12,12 +12,14 @@ import mujoco
 import numpy as np
 
 from rftsim_models.outline import Array, Faces
-from rftsim_models.studio import furnish
+from rftsim_models.studio import new_scene
 
 TORSO: Final = "torso"
 AS_MESHED: Final = 1.0
 """Longest edge of a triangle [m] that leaves the meshes as they are."""
 SEEN_GROUP: Final = 2
+SAND_GROUP: Final = 3
+"""Geom groups: that of what is only looked at, and that of what the sand presses on where it looks different."""
 BODY_RGBA: Final = (0.20, 0.32, 0.50, 1.0)
 LIMB_RGBA: Final = (0.55, 0.60, 0.68, 1.0)
 FOOT_RGBA: Final = (0.16, 0.17, 0.19, 1.0)
@@ -25,7 +27,7 @@ FOOT_RGBA: Final = (0.16, 0.17, 0.19, 1.0)
 _GEOM = mujoco.mjtGeom
 
 
-def positive(parameters: object, names: Sequence[str]) -> None:
+def check_positive(parameters: object, names: Sequence[str]) -> None:
     """Raise a ValueError for the first of these parameters that is not positive."""
     for name in names:
         if not getattr(parameters, name) > 0.0:
@@ -33,14 +35,9 @@ def positive(parameters: object, names: Sequence[str]) -> None:
 
 
 def new_robot(name: str) -> mujoco.MjSpec:
-    """An empty model with the robots' options: 5 ms, implicitfast, radians."""
-    spec = mujoco.MjSpec()
-    spec.modelname = name
+    """An empty model with the robots' options: 9.81 m/s^2, steps of 5 ms, implicitfast, radians."""
+    spec = new_scene(name, gravity=9.81, timestep=5e-3)
     spec.compiler.degree = False
-    spec.option.gravity = [0, 0, -9.81]
-    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    spec.option.timestep = 5e-3
-    furnish(spec)
     return spec
 
 
@@ -100,16 +97,13 @@ def add_seen(
     size: Sequence[float],
     pos: Sequence[float],
     rgba: Sequence[float],
-    quat: Sequence[float] = (1, 0, 0, 0),
 ) -> None:
-    """Give a body a geom that is only looked at."""
-    body.add_geom(
-        type=kind, size=size, pos=pos, quat=quat, rgba=rgba, mass=0, contype=0, conaffinity=0, group=SEEN_GROUP
-    )
+    """Give a body a geom of some size at some place [m], which is only looked at."""
+    body.add_geom(type=kind, size=size, pos=pos, rgba=rgba, mass=0, contype=0, conaffinity=0, group=SEEN_GROUP)
 
 
 def add_senses(spec: mujoco.MjSpec, torso: mujoco.MjsBody) -> None:
-    """Sensors `gyro`, `velocimeter` and `accelerometer` at the site `imu` of the torso's origin, and `orientation`."""
+    """Add `gyro`, `velocimeter` and `accelerometer` at the site `imu`, the torso's origin, and its `orientation`."""
     kind = mujoco.mjtSensor
     torso.add_site(name="imu", size=[0.004] * 3, group=4)
     for name, sense in (
@@ -123,7 +117,7 @@ def add_senses(spec: mujoco.MjSpec, torso: mujoco.MjsBody) -> None:
 
 
 def add_camera(torso: mujoco.MjsBody, distance: float) -> None:
-    """Camera `follow`, which looks at the robot from its right, somewhat from the front and above [m]."""
+    """Add the camera `follow`, which looks from this distance [m]: from the right, somewhat from ahead and above."""
     out = np.array([0.55, -1.0, 0.42])
     out /= np.linalg.norm(out)
     right = np.cross([0, 0, 1.0], out)
@@ -136,15 +130,15 @@ def add_camera(torso: mujoco.MjsBody, distance: float) -> None:
 def add_servo(
     spec: mujoco.MjSpec, joint: str, torque: float, limit: Sequence[float], *, kv: float, kp: float = 0.0
 ) -> None:
-    """A servo of a joint's rate, or of its position where kp > 0.
+    """Add a servo of a joint's rate, or of its position where kp > 0.
 
     Args:
         spec: The model.
         joint: The joint's name, and the servo's.
         torque: Largest torque [N m].
-        limit: Range of the target, [rad/s] or [rad].
-        kv: Gain of the rate [N m s/rad].
-        kp: Gain of the position [N m/rad].
+        limit: Lowest and highest target, [rad/s] or [rad].
+        kv: Torque for an error of the rate [N m s/rad].
+        kp: Torque for an error of the position [N m/rad].
     """
     servo = spec.add_actuator(name=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT, target=joint)
     if kp > 0.0:
@@ -155,7 +149,13 @@ def add_servo(
 
 
 def add_start(spec: mujoco.MjSpec, qpos: Sequence[float], ctrl: Sequence[float]) -> None:
-    """Keyframe `start`: a pose whose third coordinate, the root's height, puts the lowest vertex at z = 0."""
+    """Add the keyframe `start`: a pose whose root is at such a height that the lowest vertex is at z = 0.
+
+    Args:
+        spec: The model, whose root is a free joint, or slides along x and z.
+        qpos: The pose, whatever its height, (nq,).
+        ctrl: Controls that hold it, (nu,).
+    """
     model = spec.copy().compile()
     data = mujoco.MjData(model)
     data.qpos = qpos

@@ -15,6 +15,7 @@ from rftsim_models import parts
 from rftsim_models.outline import box, pad
 
 LEGS: Final = tuple(f"{side}_{place}" for side in ("left", "right") for place in ("front", "rear"))
+"""Ends of the names of what belongs to a leg, in the order of its joints."""
 JOINTS: Final = tuple(f"{joint}_{leg}" for leg in LEGS for joint in ("abduction", "hip", "knee"))
 """Hinges and servos, in the order of qpos[7:], qvel[6:] and ctrl."""
 FEET: Final = tuple(f"foot_{leg}" for leg in LEGS)
@@ -22,29 +23,29 @@ FEET: Final = tuple(f"foot_{leg}" for leg in LEGS)
 DIAGONALS: Final = ((0, 3), (1, 2))
 """The legs, by their place in `LEGS`, that step together in a trot."""
 RANGES: Final = ((-0.6, 0.9), (-0.9, 2.2), (-2.6, -0.3))
-"""Of abduction, hip and knee [rad]."""
+"""Lowest and highest angle of abduction, hip and knee [rad]."""
 
 
 @dataclasses.dataclass(frozen=True)
 class QuadrupedParameters:
-    """A quadruped.
+    """A quadruped; the defaults are 11 kg and 0.42 m long.
 
     Attributes:
-        length: Of the torso [m].
-        width: Of the torso [m].
-        height: Of the torso [m].
-        hip_spacing: Between front and rear hips [m].
-        hip_width: Between the abduction hinges of left and right [m].
-        hip_offset: From the abduction hinge out to the leg's plane [m].
-        thigh: From hip to knee [m].
-        shank: From knee to the middle of the foot [m].
-        foot_radius: Of the pad, level in the keyframe [m].
-        foot_height: Of the pad [m].
-        torso_mass: [kg].
-        hip_mass: Of the motors that turn with one abduction hinge [kg].
-        thigh_mass: [kg].
-        shank_mass: [kg].
-        foot_mass: [kg].
+        length: Length of the torso [m].
+        width: Width of the torso [m].
+        height: Height of the torso [m].
+        hip_spacing: Distance between front and rear hips [m].
+        hip_width: Distance between the abduction hinges of left and right [m].
+        hip_offset: Distance from the abduction hinge out to the leg's plane [m].
+        thigh: Length from hip to knee [m].
+        shank: Length from knee to the middle of the foot [m].
+        foot_radius: Radius of a foot's pad, which is level in the keyframe [m].
+        foot_height: Height of a foot's pad [m].
+        torso_mass: Mass of the torso [kg].
+        hip_mass: Mass of the motors that turn with one abduction hinge [kg].
+        thigh_mass: Mass of a thigh [kg].
+        shank_mass: Mass of a shank [kg].
+        foot_mass: Mass of a foot [kg].
         crouch: Angle of thigh and shank to the vertical in the keyframe [rad].
         torque: Largest torque of a joint [N m].
         stiffness: Position gain of the servos [N m/rad].
@@ -74,7 +75,7 @@ class QuadrupedParameters:
     armature: float = 0.01
 
     def __post_init__(self) -> None:
-        parts.positive(self, [field.name for field in dataclasses.fields(self)])
+        parts.check_positive(self, [field.name for field in dataclasses.fields(self)])
         if not self.hip_spacing <= self.length:
             raise ValueError(f"hip_spacing = {self.hip_spacing} must be at most the torso's length = {self.length}")
         low, high = -np.array(RANGES[2])[::-1] / 2

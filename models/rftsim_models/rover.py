@@ -12,14 +12,14 @@ import mujoco
 import numpy as np
 
 from rftsim_models import parts
-from rftsim_models.outline import box, extruded
-from rftsim_models.wheels import SAND_GROUP, WheelParameters
+from rftsim_models.outline import box
+from rftsim_models.wheels import WheelParameters, add_wheel_meshes
 
 WHEELS: Final = tuple(f"wheel_{side}_{place}" for side in ("left", "right") for place in ("front", "middle", "rear"))
 """Bodies, hinges and servos of the wheels, in the order of ctrl."""
 ROCKER_LIMIT: Final = 0.5
 BOGIE_LIMIT: Final = 0.6
-"""Of their hinges, both ways [rad]."""
+"""Largest angles of their hinges, both ways [rad]."""
 
 ROVER_WHEEL: Final = WheelParameters(
     radius=0.062,
@@ -42,23 +42,23 @@ the sand then takes more iterations a step."""
 
 @dataclasses.dataclass(frozen=True)
 class RoverParameters:
-    """A rover.
+    """A rover; the defaults are about Sojourner's size, 11 kg on wheels of 0.136 m diameter.
 
     Attributes:
         wheel: Shape and, as vertical_mass, mass of each wheel.
-        spacing: Between neighbouring wheels of a side along x [m].
-        track: Between the wheels of left and right [m].
-        pivot_height: Of the rockers' hinge above the wheels' [m].
-        bogie_height: Of the bogies' hinge above the wheels' [m].
-        length: Of the torso [m].
-        width: Of the torso [m].
-        height: Of the torso [m].
-        torso_mass: [kg].
-        rocker_mass: [kg].
-        bogie_mass: [kg].
+        spacing: Distance between neighbouring wheels of a side along x [m].
+        track: Distance between the wheels of left and right [m].
+        pivot_height: Height of the rockers' hinges above the wheels' [m].
+        bogie_height: Height of the bogies' hinges above the wheels' [m].
+        length: Length of the torso [m].
+        width: Width of the torso [m].
+        height: Height of the torso [m].
+        torso_mass: Mass of the torso [kg].
+        rocker_mass: Mass of a rocker [kg].
+        bogie_mass: Mass of a bogie [kg].
         torque: Largest torque of a wheel [N m].
         rate: Largest rate of a wheel [rad/s].
-        gain: Of the rate servos [N m s/rad].
+        gain: Gain of the rate servos [N m s/rad].
         armature: Inertia of a motor behind its gear [kg m^2].
     """
 
@@ -79,7 +79,7 @@ class RoverParameters:
     armature: float = 0.01
 
     def __post_init__(self) -> None:
-        parts.positive(self, [field.name for field in dataclasses.fields(self) if field.name != "wheel"])
+        parts.check_positive(self, [field.name for field in dataclasses.fields(self) if field.name != "wheel"])
         if not 2 * self.wheel.outer_radius < self.spacing:
             raise ValueError(
                 f"wheels of {self.wheel.outer_radius} m outer radius overlap at a spacing of {self.spacing} m"
@@ -100,7 +100,8 @@ def build_rover(parameters: RoverParameters = ROVER) -> mujoco.MjSpec:
     """
     p = parameters
     spec = parts.new_robot("rover")
-    _add_wheel_meshes(spec, p.wheel)
+    for mesh in add_wheel_meshes(spec, p.wheel, prefix="wheel_"):
+        mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_EXACT
     torso = spec.worldbody.add_body(name=parts.TORSO, pos=[0, 0, p.pivot_height + p.wheel.outer_radius])
     torso.add_freejoint(name="root")
     solid = box(p.length, p.width, p.height, along=5, across=3)
@@ -122,13 +123,6 @@ def build_rover(parameters: RoverParameters = ROVER) -> mujoco.MjSpec:
     parts.add_camera(torso, 3.0 * p.length)
     parts.add_start(spec, [0, 0, 0, 1, 0, 0, 0] + [0] * 10, [0] * 6)
     return spec
-
-
-def _add_wheel_meshes(spec: mujoco.MjSpec, wheel: WheelParameters) -> None:
-    for name, felt in (("wheel_felt", True), ("wheel_looks", False)):
-        vertices, faces = extruded(wheel.outline(felt), wheel.width, rings=wheel.rings)
-        exact = mujoco.mjtMeshInertia.mjMESH_INERTIA_EXACT
-        spec.add_mesh(name=name, uservert=vertices.ravel(), userface=faces.ravel(), inertia=exact)
 
 
 def _add_side(spec: mujoco.MjSpec, torso: mujoco.MjsBody, side: str, p: RoverParameters) -> None:
@@ -167,7 +161,7 @@ def _add_wheel(
         type=mesh,
         meshname="wheel_felt",
         mass=p.wheel.vertical_mass,
-        group=SAND_GROUP,
+        group=parts.SAND_GROUP,
         contype=1,
         conaffinity=0,
     )

@@ -1,9 +1,26 @@
-"""Light, sky and frame for pictures of a model."""
+"""Empty models with the options, the light and the sky that all models here share."""
 
 import mujoco
 
 
-def furnish(spec: mujoco.MjSpec) -> None:
+def new_scene(name: str, *, gravity: float, timestep: float) -> mujoco.MjSpec:
+    """An empty model by this name, lit and under a sky, which implicitfast integrates.
+
+    Args:
+        name: Name of the model.
+        gravity: Acceleration along -z [m/s^2].
+        timestep: Time step [s].
+    """
+    spec = mujoco.MjSpec()
+    spec.modelname = name
+    spec.option.gravity = [0, 0, -gravity]
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.timestep = timestep
+    _furnish(spec)
+    return spec
+
+
+def _furnish(spec: mujoco.MjSpec) -> None:
     """Give a model a light, a sky, and room for pictures of 1280 x 720."""
     spec.visual.global_.offwidth, spec.visual.global_.offheight = 1280, 720
     spec.visual.headlight.ambient = [0.45, 0.45, 0.45]

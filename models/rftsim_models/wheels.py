@@ -13,7 +13,7 @@ import numpy as np
 
 from rftsim_models import parts
 from rftsim_models.outline import Array, extruded, lugged_outline
-from rftsim_models.studio import furnish
+from rftsim_models.studio import new_scene
 
 WHEEL: Final = "wheel"
 CARRIAGE: Final = "carriage"
@@ -21,9 +21,6 @@ SERVO: Final = 1e4
 """Gain of the rate servo [N m s], stiff enough to impose the rate to a few parts in 1e4."""
 Drive = Literal["rate", "torque"]
 DRIVES: Final = get_args(Drive)
-VISUAL_GROUP: Final = 2
-SAND_GROUP: Final = 3
-"""Geom groups: what is looked at, and what the sand presses on."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -32,7 +29,7 @@ class WheelParameters:
 
     Attributes:
         radius: Radius of the disc without lugs [m].
-        width: Width [m].
+        width: Width along the axle [m].
         lugs: Number of lugs.
         lug_height: Radial height of a lug [m].
         lug_width: Width of a lug along the rim [m].
@@ -41,7 +38,7 @@ class WheelParameters:
         vertical_mass: Mass that moves vertically, the wheel's [kg].
         horizontal_mass: Mass that moves horizontally, wheel and carriage [kg].
         forward_force: Constant force on the carriage along x [N].
-        gravity: [m/s^2].
+        gravity: Acceleration along -z [m/s^2].
         arc: Segments of the rim between two lugs.
         flank: Segments of a lug's side.
         top: Segments of a lug's outer end.
@@ -65,9 +62,7 @@ class WheelParameters:
 
     def __post_init__(self) -> None:
         positive = ("radius", "width", "lug_width", "vertical_mass", "horizontal_mass", "gravity")
-        for name in positive:
-            if not getattr(self, name) > 0.0:
-                raise ValueError(f"{name} must be positive, not {getattr(self, name)}")
+        parts.check_positive(self, positive)
         if self.horizontal_mass < self.vertical_mass:
             raise ValueError(
                 f"horizontal_mass = {self.horizontal_mass} includes vertical_mass = {self.vertical_mass}: give at "
@@ -94,7 +89,7 @@ class WheelParameters:
         return dataclasses.replace(self, **(sizes | weights | changes))
 
     def outline(self, felt: bool) -> Array:
-        """Outline in x and z, (n, 2): as the sand feels it, or as it looks."""
+        """Outline in x and z [m], (n, 2): as the sand feels it, or as it looks."""
         height = self.lug_height * (self.felt_height if felt else 1.0)
         return lugged_outline(
             self.radius, self.lugs, height, self.lug_width, arc=self.arc, flank=self.flank, top=self.top
@@ -151,8 +146,8 @@ def build_wheel(
         parameters: The wheel's.
         rpm: Rate at the start, and that the rate servo aims at [revolutions per minute].
         drive: What the first control is: a servo's `rate` [rad/s], or the axle's `torque` [N m], zero at the start.
-        gain: Of the rate servo [N m s]; where its torque is limited, above twice the wheel's inertia over the time step
-            the torque jumps from limit to limit.
+        gain: Gain of the rate servo [N m s]; where its torque is limited, above twice the wheel's inertia over the time
+            step the torque jumps from limit to limit.
         torque_limit: Largest torque [N m].
 
     Raises:
@@ -163,36 +158,61 @@ def build_wheel(
     for name, value in (("gain", gain), ("torque_limit", torque_limit)):
         if not value > 0.0:
             raise ValueError(f"{name} must be positive, not {value}")
-    spec = mujoco.MjSpec()
-    spec.modelname = "wheel"
-    spec.option.gravity = [0, 0, -parameters.gravity]
-    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    spec.option.timestep = 5e-4
-    furnish(spec)
+    spec = new_scene("wheel", gravity=parameters.gravity, timestep=5e-4)
+    add_wheel_meshes(spec, parameters)
+    carriage = _add_carriage(spec, parameters)
+    _add_wheel(carriage, parameters)
+    _add_actuators(spec, drive, gain, torque_limit)
+    rate = rpm * 2 * np.pi / 60
+    rolling = 0.8 * parameters.outer_radius * rate  # near the steady state, seconds away from rest
+    spec.add_key(
+        name="start", qvel=[rolling, 0, rate], ctrl=[rate if drive == "rate" else 0.0, parameters.forward_force]
+    )
+    _add_sensors(spec, drive)
+    return spec
+
+
+def add_wheel_meshes(spec: mujoco.MjSpec, parameters: WheelParameters, prefix: str = "") -> list[mujoco.MjsMesh]:
+    """Add the meshes `felt`, which the sand presses on, and `looks`; a prefix goes before these names."""
+    meshes = []
     for name, felt in (("felt", True), ("looks", False)):
         vertices, faces = extruded(parameters.outline(felt), parameters.width, rings=parameters.rings)
-        spec.add_mesh(name=name, uservert=vertices.ravel(), userface=faces.ravel())
+        meshes.append(spec.add_mesh(name=prefix + name, uservert=vertices.ravel(), userface=faces.ravel()))
+    return meshes
+
+
+def _add_carriage(spec: mujoco.MjSpec, parameters: WheelParameters) -> mujoco.MjsBody:
+    """The carriage at the axle's height, weightless on its slide along x, with the camera `follow`."""
     height = parameters.outer_radius
     carriage = spec.worldbody.add_body(name=CARRIAGE, pos=[0, 0, height])
     _weigh(carriage, max(parameters.horizontal_mass - parameters.vertical_mass, 1e-6), 0.1)
     carriage.add_joint(name="x", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[1, 0, 0])
     carriage.gravcomp = 1
     parts.add_camera(carriage, 5.0 * height + 1.2 * parameters.width)
+    return carriage
+
+
+def _add_wheel(carriage: mujoco.MjsBody, parameters: WheelParameters) -> None:
+    """The wheel on its axle, which slides along z in the carriage; it is felt as one mesh and looks like another."""
     wheel = carriage.add_body(name=WHEEL)
     _weigh(wheel, parameters.vertical_mass, parameters.radius)
     wheel.add_joint(name="z", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[0, 0, 1])
     wheel.add_joint(name="axle", type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, 1, 0])
     mesh = mujoco.mjtGeom.mjGEOM_MESH
-    wheel.add_geom(name="felt", type=mesh, meshname="felt", group=SAND_GROUP, rgba=[0.5, 0.5, 0.5, 1])
+    wheel.add_geom(name="felt", type=mesh, meshname="felt", group=parts.SAND_GROUP, rgba=[0.5, 0.5, 0.5, 1])
     wheel.add_geom(
         name="looks",
         type=mesh,
         meshname="looks",
-        group=VISUAL_GROUP,
+        group=parts.SEEN_GROUP,
         contype=0,
         conaffinity=0,
-        rgba=[0.55, 0.60, 0.68, 1],
+        rgba=parts.LIMB_RGBA,
     )
+
+
+def _add_actuators(spec: mujoco.MjSpec, drive: Drive, gain: float, torque_limit: float) -> None:
+    """The drive of the axle, and the push of the carriage."""
     motor = spec.add_actuator(name=drive, trntype=mujoco.mjtTrn.mjTRN_JOINT, target="axle")
     if drive == "rate":
         motor.set_to_velocity(kv=gain)
@@ -202,11 +222,10 @@ def build_wheel(
         motor.forcerange = [-torque_limit, torque_limit]
     push = spec.add_actuator(name="push", trntype=mujoco.mjtTrn.mjTRN_JOINT, target="x")
     push.set_to_motor()
-    rate = rpm * 2 * np.pi / 60
-    rolling = 0.8 * parameters.outer_radius * rate  # near the steady state, seconds away from rest
-    spec.add_key(
-        name="start", qvel=[rolling, 0, rate], ctrl=[rate if drive == "rate" else 0.0, parameters.forward_force]
-    )
+
+
+def _add_sensors(spec: mujoco.MjSpec, drive: Drive) -> None:
+    """Place and speed of the axle, rate of the wheel, and the torque of its drive."""
     sensor = mujoco.mjtSensor
     for name, kind, joint in (
         ("x", sensor.mjSENS_JOINTPOS, "x"),
@@ -216,7 +235,6 @@ def build_wheel(
     ):
         spec.add_sensor(name=name, type=kind, objtype=mujoco.mjtObj.mjOBJ_JOINT, objname=joint)
     spec.add_sensor(name="torque", type=sensor.mjSENS_ACTUATORFRC, objtype=mujoco.mjtObj.mjOBJ_ACTUATOR, objname=drive)
-    return spec
 
 
 def _weigh(body: mujoco.MjsBody, mass: float, radius: float) -> None:
