@@ -15,18 +15,18 @@ from rftsim_envs.task import Config, Moment, Task, to_body, yaw_of
 WALK: Final = 10.0
 """Rate of the legs for an action of zero [rad/s]."""
 SWAY: Final = 12.0
-"""How far an action takes it from there [rad/s]."""
+"""Change of that rate for an action of one [rad/s]."""
 UNIT: Final = float(np.sqrt(9.81 * HEXAPOD.hip_height))
-"""Speed that the reward counts in: sqrt(g h), h the height of the hips [m/s]."""
+"""Speed that observation and reward count in: sqrt(g h), h the height of the hips [m/s]."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class HexapodConfig(Config):
-    """Settings of the hexapod.
+    """Settings of the hexapod, beside those of all environments.
 
     Attributes:
         straight: Weight of the sideways speed and of the turning in the reward.
-        energy: Weight of the squared power. A supply's losses grow with the square of its current.
+        energy: Weight of the squared power in the reward. A supply's losses grow with the square of its current.
     """
 
     sand: str = "close-poppy-seeds"
@@ -68,22 +68,22 @@ class CLegHexapod(Task):
     config: HexapodConfig
 
     def build(self) -> mujoco.MjSpec:
-        """See `Task`."""
+        """The hexapod, whose first keyframe stands on six legs."""
         return build_hexapod()
 
     def start(self, rng: np.random.Generator, qpos: Array, qvel: Array) -> Array:
-        """At rest on one tripod; the other's legs point up."""
+        """Put the robot at rest on one tripod, the other's legs pointing up; nothing is commanded."""
         raised = TRIPODS[rng.integers(2)]
         qpos[7:] = rng.uniform(-0.2, 0.2, size=len(LEGS))
         qpos[7 + np.array(raised)] += np.pi
         return np.empty(0)
 
     def controls(self, action: Array, moment: Moment) -> Array:
-        """See `Task`."""
+        """Rates of the legs [rad/s], (n, 6): a walk, faster or slower as the action says."""
         return WALK + SWAY * action
 
     def observe(self, moment: Moment) -> Array:
-        """See `Task`."""
+        """The observation of the class's table, (n, 35)."""
         quaternion, legs, twist = moment.qpos[:, 3:7], moment.qpos[:, 7:], moment.qvel
         heading = yaw_of(quaternion)
         return np.hstack(
@@ -101,7 +101,7 @@ class CLegHexapod(Task):
         )
 
     def rewards(self, moment: Moment) -> dict[str, Array]:
-        """See `Task`."""
+        """Terms for speed, for what goes `aside`, and for the motors' power, (n,) each."""
         told = self.measures(moment)
         return running_straight(
             told["speed"] / UNIT,
@@ -113,11 +113,11 @@ class CLegHexapod(Task):
         )
 
     def failed(self, moment: Moment) -> Flags:
-        """On the back or the side."""
+        """Whether the robot lies on its back or on its side, (n,)."""
         return np.asarray(to_body(moment.qpos[:, 3:7], moment.gravity)[:, 2] > -0.3)
 
     def measures(self, moment: Moment) -> dict[str, Array]:
-        """See `Task`."""
+        """Speed along x, drift along y [m/s] and heading [rad], (n,) each."""
         drift = (moment.qpos[:, 1] - moment.before[:, 1]) / moment.period
         return {"speed": self.speed(moment), "drift": drift, "heading": yaw_of(moment.qpos[:, 3:7])}
 
@@ -129,6 +129,6 @@ class CLegHexapod(Task):
 def running_straight(
     speed: Array, drift: Array, heading: Array, power: Array, straight: float, energy: float
 ) -> dict[str, Array]:
-    """Fast along x, not aside, facing ahead, at a steady draw; all without dimensions."""
+    """Terms for running fast along x, not aside, facing ahead, at a steady draw; all without dimensions."""
     aside = np.abs(drift) + np.minimum(np.abs(heading), 1.0)
     return {"speed": speed, "aside": -straight * aside, "power": -energy * power**2}

@@ -1,4 +1,4 @@
-"""One environment, for Gymnasium."""
+"""A Gymnasium environment of one simulation."""
 
 from typing import Any, Literal
 
@@ -16,16 +16,16 @@ Action = NDArray[np.float32]
 
 
 class SandEnv(gym.Env[Observation, Action], EzPickle):
-    """A task in one simulation.
+    """A task in one simulation, as an environment of Gymnasium.
 
     Episodes begin anew only at `reset`. Where MuJoCo gives a simulation up, the episode is terminated with
     `info["diverged"]` and no reward. Actions outside -1 and 1 are clipped; those that are not finite are refused.
 
     Args:
-        task: One of `rftsim_envs.TASKS`.
+        task: Name of one of `rftsim_envs.TASKS`.
         render_mode: `rgb_array`, or None.
-        width: Of pictures [pixels].
-        height: Of pictures [pixels].
+        width: Width of pictures [pixels].
+        height: Height of pictures [pixels].
         **settings: Fields of the task's Config.
 
     Raises:
@@ -58,13 +58,13 @@ class SandEnv(gym.Env[Observation, Action], EzPickle):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Begin an episode."""
+        """Begin an episode, and return its first observation, (nobservation,), and what is known of its ground."""
         super().reset(seed=seed)
         self.episodes.restart([0], [self.np_random])
         return self.episodes.observation()[0], _alone(self.episodes.info())
 
     def step(self, action: ArrayLike) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Go on by one control step."""
+        """Go on by one control step with an action, (naction,)."""
         out = self.episodes.step(np.asarray(action)[None])
         return (
             out.observation[0],
@@ -75,7 +75,7 @@ class SandEnv(gym.Env[Observation, Action], EzPickle):
         )
 
     def render(self) -> NDArray[np.uint8] | None:
-        """A picture, (height, width, 3)."""
+        """A picture through the camera `follow`, (height, width, 3), or None without a render mode."""
         if self.render_mode is None:
             return None
         if self._renderer is None:
@@ -93,7 +93,7 @@ class SandEnv(gym.Env[Observation, Action], EzPickle):
 
 
 def spaces(episodes: Episodes) -> tuple[Any, Any]:
-    """Observations and actions of one simulation."""
+    """The spaces of observations and of actions of one simulation."""
     return (
         gym.spaces.Box(-np.inf, np.inf, (episodes.nobservation,), np.float32),
         gym.spaces.Box(-1.0, 1.0, (episodes.task.naction,), np.float32),

@@ -15,29 +15,29 @@ Observation = NDArray[np.float32]
 
 
 class Outcome(NamedTuple):
-    """What a control step of n simulations gave."""
+    """Outcome of a control step of n simulations."""
 
     observation: Observation
-    """(n, nobservation)."""
+    """Observations at the step's end, (n, nobservation)."""
     reward: Array
-    """(n,)."""
+    """Rewards of the step, (n,); zero where MuJoCo gave a simulation up."""
     terminated: Flags
-    """(n,)."""
+    """Whether the episode ended early: in failure, in success or because MuJoCo gave it up, (n,)."""
     truncated: Flags
-    """(n,)."""
+    """Whether the episode ended because its time was up, (n,)."""
     info: dict[str, NDArray[np.generic]]
-    """(n,) each."""
+    """Terms of the reward as `reward/NAME`, what the task measures, and what all tasks tell, (n,) each."""
 
 
 class Episodes:
-    """Episodes of a task.
+    """Episodes of a task in all simulations of a physics.
 
     Args:
-        task: What is asked; its robot is in the physics' model.
+        task: The task, whose robot is in the physics' model.
         physics: The simulations.
 
     Attributes:
-        nobservation: Numbers in an observation.
+        nobservation: Number of numbers in an observation.
     """
 
     def __init__(self, task: Task, physics: Physics) -> None:
@@ -67,20 +67,20 @@ class Episodes:
             kept[list(chosen)] = 0
 
     def observation(self) -> Observation:
-        """What policies see now, (n, nobservation)."""
+        """Observations at the start of an episode, (n, nobservation)."""
         return self._observe(self._moment(self._qpos, np.zeros(self.physics.n)))
 
     def info(self) -> dict[str, NDArray[np.generic]]:
-        """What is known at the start of an episode, (n,) each."""
+        """The `strength`, `friction` [-] and `slope_deg` [deg] of the ground that an episode has, (n,) each."""
         strength, friction = np.exp(self.ground.draws[:, :2]).T
         slope = np.rad2deg(np.arcsin(np.linalg.norm(self.ground.draws[:, 2:], axis=1)))
         return {"strength": strength, "friction": friction, "slope_deg": slope}
 
     def step(self, action: ArrayLike) -> Outcome:
-        """A control step of every simulation.
+        """Take a control step in every simulation.
 
         Args:
-            action: (n, naction); clipped to -1 and 1.
+            action: Actions, (n, naction), which are clipped to -1 and 1.
 
         Raises:
             ValueError: It has another shape, or is not finite.

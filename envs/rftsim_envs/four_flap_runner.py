@@ -5,7 +5,7 @@ from typing import Final, Literal
 
 import mujoco
 import numpy as np
-from rftsim_models.wheels import FOUR_FLAP_RUNNER, build_wheel
+from rftsim_models.wheels import FOUR_FLAP_RUNNER, WHEEL, build_wheel
 
 from rftsim_envs.physics import Array
 from rftsim_envs.recipe import Drive, Training, constant
@@ -16,18 +16,18 @@ RUNNER: Final = dataclasses.replace(FOUR_FLAP_RUNNER, arc=3, flank=6, top=1)
 ROLL: Final = 7.0
 """Rate of the drive for an action of zero [rad/s]."""
 SWAY: Final = 8.0
-"""How far an action takes it from there [rad/s]."""
+"""Change of that rate for an action of one [rad/s]."""
 TORQUE: Final = 20.0
-"""Most that the drive gives [N m]; twice the weight times the outer radius."""
+"""Largest torque of the drive [N m]; twice the weight times the outer radius."""
 GAIN: Final = 20.0
-"""Of the rate servo [N m s]."""
+"""Gain of the rate servo [N m s]."""
 UNIT: Final = float(np.sqrt(RUNNER.gravity * 2 * RUNNER.outer_radius))
-"""Speed that the reward counts in, sqrt(g l), l the outer diameter [m/s]."""
+"""Speed that observation and reward count in: sqrt(g l), l the outer diameter [m/s]."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class RunnerConfig(Config):
-    """Settings of the runner.
+    """Settings of the runner, beside those of all environments.
 
     Attributes:
         energy: Weight of the squared power in the reward. A supply's losses grow with the square of its current, so
@@ -36,8 +36,6 @@ class RunnerConfig(Config):
 
     sand: str = "preset=poppy-seeds,lambda_=4"
     law: Literal["rft2d", "drft2d", "rft3d", "drft3d"] = "drft2d"
-    timestep: float = 0.005
-    period: float = 0.02
     duration: float = 5.0
     energy: float = 1.0
 
@@ -63,48 +61,47 @@ class FourFlapRunner(Task):
     """
 
     Settings = RunnerConfig
-    felt = ("wheel",)
+    felt = (WHEEL,)
     planar = True
-    edge = 2.0
+    edge = 2 * RUNNER.width
     naction = 1
     training = Training(steps=300_000, n_steps=64, batch_size=256, n_epochs=10, learning_rate=8e-4, log_std_init=-2.0)
     config: RunnerConfig
 
     def build(self) -> mujoco.MjSpec:
-        """See `Task`."""
+        """The runner on its carriage, its rate commanded."""
         return build_wheel(RUNNER, 0.0, gain=GAIN, torque_limit=TORQUE)
 
     def start(self, rng: np.random.Generator, qpos: Array, qvel: Array) -> Array:
-        """At rest on the sand, at any angle."""
+        """Put the wheel at rest on the sand, at any angle; nothing is commanded."""
         qpos[2] = rng.uniform(0.0, 2.0 * np.pi)
-        qvel[:] = 0.0
         return np.empty(0)
 
     def controls(self, action: Array, moment: Moment) -> Array:
-        """See `Task`."""
+        """Rate of the drive [rad/s] and no push [N], (n, 2)."""
         return np.hstack([ROLL + SWAY * action, np.zeros_like(action)])
 
     def observe(self, moment: Moment) -> Array:
-        """See `Task`."""
+        """The observation of the class's table, (n, 7)."""
         angle, (vx, vz, rate) = 4.0 * moment.qpos[:, 2], moment.qvel.T
         columns = np.sin(angle), np.cos(angle), rate / 15.0, vx / UNIT, vz / UNIT, 10.0 * moment.qpos[:, 1]
         return np.column_stack([*columns, moment.action])
 
     def rewards(self, moment: Moment) -> dict[str, Array]:
-        """See `Task`."""
+        """Terms for speed and for the drive's power, (n,) each."""
         return running(self.speed(moment), moment.power, UNIT, self.weight, self.config.energy)
 
     def open_loops(self) -> dict[str, Drive]:
-        """Constant rates."""
+        """Constant rates of the drive, from 1 to 15 rad/s."""
         return {f"{rate:g} rad/s": constant((rate - ROLL) / SWAY) for rate in range(1, 16)}
 
     def measures(self, moment: Moment) -> dict[str, Array]:
-        """See `Task`."""
+        """Speed along x [m/s], rate [rad/s] and slip [-], (n,) each."""
         speed, rate = self.speed(moment), moment.qvel[:, 2]
         slip = 1.0 - speed / np.maximum(RUNNER.outer_radius * rate, 1e-3)
         return {"speed": speed, "rate": rate, "slip": slip}
 
 
 def running(speed: Array, power: Array, unit: float, weight: float, energy: float) -> dict[str, Array]:
-    """Fast, at a steady draw: both without dimensions."""
+    """Terms for running fast at a steady draw, both without dimensions, (n,) each."""
     return {"speed": speed / unit, "power": -energy * (power / (weight * unit)) ** 2}

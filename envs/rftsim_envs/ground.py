@@ -1,4 +1,4 @@
-"""What is under a robot: sand, whose strength, friction and slope may differ in each episode, or a rigid floor."""
+"""The ground under a robot: sand, whose strength, friction and slope may differ in each episode, or a rigid floor."""
 
 import math
 from typing import Final, NamedTuple
@@ -13,26 +13,27 @@ from rftsim_envs.physics import Array, Physics
 from rftsim_envs.task import Config, Task
 
 FRICTION: Final = 0.8
-"""Of the rigid floor [-]."""
+"""Friction coefficient of the rigid floor [-]."""
 FLOOR: Final = "floor"
+"""Name of the rigid floor's geom, texture and material."""
 NUMBERS: Final = 4
-"""How many numbers tell of a ground."""
+"""Number of numbers that tell of a ground."""
 
 
 class Draw(NamedTuple):
-    """The ground of one episode."""
+    """The ground of one episode, as factors of the configured one."""
 
     strength: float
-    """Factor of xi_n and zeta."""
+    """Factor of the sand's strength, xi_n and zeta."""
     friction: float
-    """Factor of the friction."""
+    """Factor of the friction, mu_surf or the floor's."""
     downhill: tuple[float, float]
     """Sines of the slope along x and y."""
 
 
-def lay(task: Task) -> mujoco.MjModel:
-    """The task's robot on its ground, compiled."""
-    config, spec = task.config, task.build()
+def lay(task: Task, robot: mujoco.MjSpec | None = None) -> mujoco.MjModel:
+    """The model of a task's robot, or of another in its place, on the task's ground."""
+    config, spec = task.config, task.build() if robot is None else robot
     spec.option.timestep = config.timestep
     if config.ground == "sand":
         add_sand(spec, config.sand, config.law, bodies=task.felt, max_edge=task.edge, **task.options())
@@ -66,7 +67,7 @@ def _add_floor(spec: mujoco.MjSpec) -> None:
 
 
 def draw(config: Config, planar: bool, rng: np.random.Generator) -> Draw:
-    """A ground for an episode."""
+    """Draw a ground for one episode; its slope is along x if the task is planar."""
     strength, friction = (math.exp(rng.uniform(*np.log(pair))) for pair in (config.strength, config.friction))
     slope, way = math.radians(rng.uniform(0.0, config.slope_deg)), rng.uniform(0.0, 2.0 * math.pi)
     if planar:
@@ -75,10 +76,11 @@ def draw(config: Config, planar: bool, rng: np.random.Generator) -> Draw:
 
 
 class Ground:
-    """The ground of several simulations.
+    """The grounds of several simulations, which may differ.
 
     Attributes:
-        draws: What tells of each: log strength, log friction, sines of the slope along x and y; (n, NUMBERS).
+        draws: Numbers that tell of each ground, (n, NUMBERS): log of strength and friction, sines of the slope along x
+            and y.
         gravity: Unit vectors downward, (n, 3).
     """
 

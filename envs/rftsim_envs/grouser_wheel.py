@@ -10,20 +10,22 @@ from rftsim_models.wheels import GROUSER_WHEEL, WHEEL, build_wheel
 from rftsim.surface.triangles import Wheel
 from rftsim_envs.physics import Array
 from rftsim_envs.recipe import Training
+from rftsim_envs.settings import check_positive
 from rftsim_envs.task import Config, ConfigError, Moment, Task
 
 TORQUE: Final = 5.0
-"""Most that the drive gives [N m]; three quarters of the weight times the outer radius."""
-TOP_SPEED: Final = 0.5
-"""What speeds are observed and rewarded in [m/s]."""
+"""Largest torque of the drive [N m]; three quarters of the weight times the outer radius."""
+UNIT: Final = 0.5
+"""Speed that observation and reward count in [m/s]."""
 RADIUS: Final = GROUSER_WHEEL.outer_radius
+"""Outer radius of the wheel [m]."""
 WEIGHT: Final = GROUSER_WHEEL.vertical_mass * GROUSER_WHEEL.gravity
-"""Of the wheel; that of the carriage is borne by its guide [N]."""
+"""Weight of the wheel [N]; that of the carriage is borne by its guide."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class WheelConfig(Config):
-    """Settings of the wheel.
+    """Settings of the wheel, beside those of all environments.
 
     Attributes:
         speed: Range of the commanded speed, drawn for each episode [m/s].
@@ -50,8 +52,7 @@ class WheelConfig(Config):
             low, high = getattr(self, name)
             if not 0.0 <= low <= high:
                 raise ConfigError(f"{name} must be a range from 0 up, low to high, not {(low, high)}")
-        if not self.spread > 0.0:
-            raise ConfigError(f"spread must be positive, not {self.spread:g}")
+        check_positive(self, ("spread",), ConfigError)
 
 
 class GrouserWheel(Task):
@@ -91,40 +92,40 @@ class GrouserWheel(Task):
     config: WheelConfig
 
     def options(self) -> dict[str, Any]:
-        """The free surface drops behind the wheel."""
+        """The wheel as one behind which the free surface drops."""
         return {"wheels": {WHEEL: Wheel((0, 1, 0), (0, 0, 0), RADIUS)}}
 
     def build(self) -> mujoco.MjSpec:
-        """See `Task`."""
+        """The wheel on its carriage, its torque commanded."""
         return build_wheel(GROUSER_WHEEL, 0.0, drive="torque", torque_limit=TORQUE)
 
     def start(self, rng: np.random.Generator, qpos: Array, qvel: Array) -> Array:
-        """At rest on the ground, at any angle."""
+        """Put the wheel at rest on the ground, at any angle; command a speed [m/s] and a drawbar load [N]."""
         qpos[2] = rng.uniform(0.0, 2.0 * np.pi)
         return np.array([rng.uniform(*self.config.speed), rng.uniform(*self.config.drawbar)])
 
     def controls(self, action: Array, moment: Moment) -> Array:
-        """See `Task`."""
+        """Torque of the drive [N m] and push less the drawbar load [N], (n, 2)."""
         return np.column_stack([TORQUE * action, GROUSER_WHEEL.forward_force - moment.command[:, 1]])
 
     def observe(self, moment: Moment) -> Array:
-        """See `Task`."""
+        """The observation of the class's table, (n, 8) or, with the drawbar load, (n, 9)."""
         (vx, vz, rate), (command, drawbar) = moment.qvel.T, moment.command.T
-        speeds = np.column_stack([command, command - vx, vx, vz, RADIUS * rate, RADIUS * rate - vx]) / TOP_SPEED
+        speeds = np.column_stack([command, command - vx, vx, vz, RADIUS * rate, RADIUS * rate - vx]) / UNIT
         seen = [speeds, -moment.qpos[:, 1:2] / RADIUS, moment.action]
         return np.column_stack([*seen, drawbar / WEIGHT] if self.config.observe_drawbar else seen)
 
     def rewards(self, moment: Moment) -> dict[str, Array]:
-        """See `Task`."""
+        """Terms for tracking, for slip and for the power of drive and push, (n,) each."""
         speed, c = self.speed(moment), self.config
         return {
             "tracking": tracking(speed, moment.command[:, 0], c.spread),
-            "slip": -c.slip * ((RADIUS * moment.qvel[:, 2] - speed) / TOP_SPEED) ** 2,
-            "power": -c.energy * moment.power / (WEIGHT * TOP_SPEED),
+            "slip": -c.slip * ((RADIUS * moment.qvel[:, 2] - speed) / UNIT) ** 2,
+            "power": -c.energy * moment.power / (WEIGHT * UNIT),
         }
 
     def measures(self, moment: Moment) -> dict[str, Array]:
-        """See `Task`."""
+        """Speed, command [m/s], drawbar [N], rate [rad/s], slip [-] and sinkage [m], (n,) each."""
         speed, rate = self.speed(moment), moment.qvel[:, 2].copy()
         return {
             "speed": speed,
@@ -137,11 +138,11 @@ class GrouserWheel(Task):
 
 
 def tracking(speed: Array, command: Array, spread: float) -> Array:
-    """1 at the commanded speed, 1/e where it is missed by the spread."""
+    """Reward that is 1 at the commanded speed and 1/e where it is missed by the spread, (n,)."""
     value: Array = np.exp(-np.abs(speed - command) / spread)
     return value
 
 
 def slip(rim: Array, speed: Array) -> Array:
-    """What rim and hub differ in, over the faster: within -1 and 1 where they go the same way, 0 at rest."""
+    """Speed of the rim less that of the hub, over the faster: within -1 and 1 where they go the same way, 0 at rest."""
     return (rim - speed) / np.maximum(np.maximum(np.abs(rim), np.abs(speed)), 1e-3)

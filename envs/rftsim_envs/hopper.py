@@ -13,9 +13,9 @@ from rftsim_envs.recipe import Drive, Training
 from rftsim_envs.task import Config, ConfigError, Moment, Task
 
 POSE: Final = np.array([-HOPPER.crouch, 2 * HOPPER.crouch, -HOPPER.crouch])
-"""Of hip, knee and ankle, about which actions move them [rad]."""
+"""Angles of hip, knee and ankle about which actions move them [rad], (3,)."""
 REACH: Final = np.array([0.7, 0.9, 0.7])
-"""How far they move them [rad]."""
+"""Change of these angles for an action of one [rad], (3,)."""
 LOWEST: Final = 0.22
 """Height of the hip below which the hopper has fallen [m]."""
 STEEPEST: Final = 0.9
@@ -24,12 +24,12 @@ STEEPEST: Final = 0.9
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class HopperConfig(Config):
-    """Settings of the hopper.
+    """Settings of the hopper, beside those of all environments.
 
     Attributes:
         speed: Range of the commanded speed, drawn for each episode [m/s].
-        energy: Weight of the power, over m g times 1 m/s.
-        smooth: Weight of the squared change of the action from step to step.
+        energy: Weight of the power, over m g times 1 m/s, in the reward.
+        smooth: Weight of the squared change of the action from step to step in the reward.
     """
 
     sand: str = "close-poppy-seeds"
@@ -79,22 +79,22 @@ class Hopper(Task):
     config: HopperConfig
 
     def build(self) -> mujoco.MjSpec:
-        """See `Task`."""
+        """The hopper, whose first keyframe crouches on its flat foot."""
         return build_hopper()
 
     def start(self, rng: np.random.Generator, qpos: Array, qvel: Array) -> Array:
-        """Near the crouch, nearly at rest; the command is drawn."""
+        """Put the hopper near its crouch, nearly at rest, and command a speed [m/s]."""
         qpos[2:] += rng.uniform(-0.03, 0.03, size=4)
         qvel[:] = rng.uniform(-0.03, 0.03, size=qvel.size)
         return np.array([rng.uniform(*self.config.speed)])
 
     def controls(self, action: Array, moment: Moment) -> Array:
-        """See `Task`."""
+        """Targets of hip, knee and ankle [rad], (n, 3), within their ranges."""
         target: Array = np.clip(POSE + REACH * action, *np.transpose(RANGES))
         return target
 
     def observe(self, moment: Moment) -> Array:
-        """See `Task`."""
+        """The observation of the class's table, (n, 16)."""
         columns = [
             moment.command,
             moment.qpos[:, 1:2] / 0.5,
@@ -108,7 +108,7 @@ class Hopper(Task):
         return np.hstack(columns)
 
     def rewards(self, moment: Moment) -> dict[str, Array]:
-        """See `Task`."""
+        """Terms for tracking, standing upright, power and jerks, (n,) each."""
         return hopping(
             self.speed(moment) / moment.command[:, 0],
             moment.power / self.weight,
@@ -118,12 +118,12 @@ class Hopper(Task):
         )
 
     def failed(self, moment: Moment) -> Flags:
-        """Fallen."""
+        """Whether the hip is below LOWEST or the torso leans beyond STEEPEST, (n,)."""
         fallen: Flags = (moment.qpos[:, 1] < LOWEST) | (_lean(moment)[:, 1] > -np.cos(STEEPEST))
         return fallen
 
     def measures(self, moment: Moment) -> dict[str, Array]:
-        """See `Task`."""
+        """Speed along x, command [m/s] and height of the hip [m], (n,) each."""
         return {
             "speed": self.speed(moment),
             "command": moment.command[:, 0].copy(),
@@ -144,7 +144,7 @@ class Hopper(Task):
 
 
 def _strokes(rate: float, stroke: float, swing: float, ahead: float) -> Drive:
-    """The leg folds and stretches, hip and ankle half as much as the knee."""
+    """A drive that folds and stretches the leg, hip and ankle half as much as the knee, and swings it."""
 
     def drive(time: float) -> Array:
         fold, swung = stroke * np.sin(rate * time), swing * np.sin(rate * time + ahead)
@@ -156,14 +156,22 @@ def _strokes(rate: float, stroke: float, swing: float, ahead: float) -> Drive:
 
 
 def _lean(moment: Moment) -> Array:
-    """Downward along the torso's x and z, (n, 2); the pitch turns x to -z."""
+    """Components of downward along the torso's x and z, (n, 2); the pitch turns x to -z."""
     sine, cosine = np.sin(moment.qpos[:, 2]), np.cos(moment.qpos[:, 2])
     x, z = moment.gravity[:, 0], moment.gravity[:, 2]
     return np.column_stack([x * cosine - z * sine, x * sine + z * cosine])
 
 
 def hopping(speed: Array, power: Array, change: Array, energy: float, smooth: float) -> dict[str, Array]:
-    """At the commanded speed (over it), upright, cheap (power over weight [m/s]) and without jerks."""
+    """Terms for hopping at a speed, (n,) each.
+
+    Args:
+        speed: Speed over the commanded one [-], (n,).
+        power: Power over the weight [m/s], (n,).
+        change: Change of the action, (n, naction).
+        energy: Weight of the power.
+        smooth: Weight of the squared change.
+    """
     return {
         "tracking": np.maximum(1.0 - np.abs(speed - 1.0), -1.0),
         "upright": np.full(len(speed), 0.2),

@@ -1,4 +1,4 @@
-"""Where a step leaves the range in which resistive force theory holds, cheaply enough for each one."""
+"""Whether a step is in the range in which resistive force theory holds, cheaply enough to ask at each one."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +28,7 @@ class Limits:
         self._roots = physics.model.body_rootid[self._bodies]
 
     def measures(self) -> dict[str, NDArray[np.generic]]:
-        """`froude` and `depth_ratio`, the largest of the bodies, and whether the law is `in_range`; (n,) each."""
+        """`froude` and `depth_ratio` [-], the largest of the bodies, and whether the law is `in_range`; (n,) each."""
         if not self._bodies:
             return {}
         turn = self._turn[:, self._bodies].reshape(-1, len(self._bodies), 3, 3)

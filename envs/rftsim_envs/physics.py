@@ -28,17 +28,17 @@ _FATAL: Final = [
 
 
 class Physics(Protocol):
-    """Several simulations of one model."""
+    """Several simulations of one model side by side, as episodes need them."""
 
     model: mujoco.MjModel
-    """The model; the sand of a simulation is in `setting("numeric_data")`."""
+    """Model of all simulations; the sand of each is in `setting("numeric_data")`."""
     n: int
-    """How many simulations."""
+    """Number of simulations."""
     shown: mujoco.MjModel
-    """The model that `snapshot`'s data belong to."""
+    """Model that the data of `snapshot` belong to."""
 
     def field(self, name: str) -> Array:
-        """A field of MjData, live, (n, ...). What is not state is that of the last time step's start."""
+        """A field of MjData, live, (n, ...); values that are not state are those of the last time step's start."""
         ...
 
     def setting(self, name: str) -> Array:
@@ -46,7 +46,7 @@ class Physics(Protocol):
         ...
 
     def step(self, nstep: int) -> Array:
-        """Some time steps of each simulation, fewer where it fails; mean positive power of its actuators [W], (n,)."""
+        """Take some time steps, fewer where one fails, and return the actuators' mean positive power [W], (n,)."""
         ...
 
     def restart(self, chosen: Sequence[int], place: Callable[[], None]) -> None:
@@ -54,7 +54,7 @@ class Physics(Protocol):
         ...
 
     def failed(self) -> Flags:
-        """Which simulations MuJoCo has given up since their restart, (n,)."""
+        """Whether MuJoCo has given a simulation up since its restart, (n,)."""
         ...
 
     def snapshot(self, i: int) -> mujoco.MjData:
@@ -70,18 +70,18 @@ class One:
         self.data, self.n = mujoco.MjData(model), 1
 
     def field(self, name: str) -> Array:
-        """See `Physics`."""
+        """A field of MjData as a view with a first axis of one simulation, (1, ...)."""
         view: Array = getattr(self.data, name)[None]
         return view
 
     def setting(self, name: str) -> Array:
-        """See `Physics`."""
+        """A field of MjModel or an option as a view that writes to the model, (1, ...)."""
         option = name.removeprefix("opt.")
         view: Array = getattr(self.model if option == name else self.model.opt, option)[None]
         return view
 
     def step(self, nstep: int) -> Array:
-        """See `Physics`."""
+        """Take time steps until one fails, and return the actuators' mean positive power [W], (1,)."""
         force, rate = np.empty((2, 1, nstep, self.model.nu))
         failed = False
         for k in range(nstep):
@@ -92,27 +92,27 @@ class One:
         return _mean_power(force, rate)
 
     def restart(self, chosen: Sequence[int], place: Callable[[], None]) -> None:
-        """See `Physics`."""
+        """Reset the data, let `place` write to them, and compute the rest."""
         mujoco.mj_resetData(self.model, self.data)
         place()
         mujoco.mj_forward(self.model, self.data)
 
     def failed(self) -> Flags:
-        """See `Physics`."""
+        """Whether a warning of MuJoCo says that it has given the simulation up, (1,)."""
         return np.array([any(self.data.warning[kind].number for kind in _FATAL)])
 
     def snapshot(self, i: int) -> mujoco.MjData:
-        """See `Physics`."""
+        """The data themselves, those of the only simulation."""
         return self.data
 
 
 class Many:
-    """Many simulations on threads.
+    """Many simulations on threads, by `mujoco.batch`.
 
     Args:
-        model: What all simulate; copied.
-        n: How many.
-        threads: 0 for as many as there are processors.
+        model: Model that all simulate; it is copied.
+        n: Number of simulations.
+        threads: Number of threads; 0 for as many as there are processors.
     """
 
     def __init__(self, model: mujoco.MjModel, n: int, threads: int = 0) -> None:
@@ -120,33 +120,33 @@ class Many:
         self._batch, self._data = Batch(model, n, threads), mujoco.MjData(self.shown)
 
     def field(self, name: str) -> Array:
-        """See `Physics`."""
+        """A field of MjData as the batch holds it, (n, ...)."""
         view: Array = self._batch.bind(name)
         return view
 
     def setting(self, name: str) -> Array:
-        """See `Physics`."""
+        """A field of MjModel or an option, of which each simulation has its own, (n, ...)."""
         view: Array = self._batch.expand(name)
         return view
 
     def step(self, nstep: int) -> Array:
-        """See `Physics`."""
+        """Take all time steps in one go, and return the actuators' mean positive power [W], (n,)."""
         told = self._batch.rollout(nstep, record=("actuator_force", "actuator_velocity"))  # no thread waits in between
         return _mean_power(told["actuator_force"], told["actuator_velocity"])
 
     def restart(self, chosen: Sequence[int], place: Callable[[], None]) -> None:
-        """See `Physics`."""
+        """Reset the chosen simulations, let `place` write to them, and compute the rest."""
         self._batch.reset(chosen, stage=mujoco.mjtStage.mjSTAGE_NONE.value)
         place()
         self._batch.forward(chosen)
 
     def failed(self) -> Flags:
-        """See `Physics`."""
+        """Whether a warning of MuJoCo says that it has given a simulation up, (n,)."""
         counts: NDArray[np.int32] = self._batch.warning[:, _FATAL, 1]
         return np.asarray(counts.any(axis=1))
 
     def snapshot(self, i: int) -> mujoco.MjData:
-        """See `Physics`; what is not state is that of an mj_forward."""
+        """Copy of the data of simulation i, in which values that are not state are those of an mj_forward."""
         self._batch.get_model(i, self.shown)
         self._batch.get_data(i, self._data)
         mujoco.mj_forward(self.shown, self._data)
@@ -154,6 +154,6 @@ class Many:
 
 
 def _mean_power(force: Array, rate: Array) -> Array:
-    """Positive power, mean over the steps: (n, nstep, nu) each to (n,)."""
+    """Mean positive power over the steps [W], (n,), from forces and rates (n, nstep, nu)."""
     power: Array = np.maximum(force * rate, 0.0).sum(axis=2).mean(axis=1)
     return power

@@ -6,17 +6,19 @@ from typing import Final
 import mujoco
 import numpy as np
 from rftsim_models import parts
-from rftsim_models.quadruped import FEET, QUADRUPED, RANGES, build_quadruped
+from rftsim_models.quadruped import FEET, JOINTS, QUADRUPED, RANGES, build_quadruped
 
 from rftsim_envs.physics import Array, Flags
 from rftsim_envs.recipe import Training
+from rftsim_envs.settings import check_positive
 from rftsim_envs.task import Config, ConfigError, Moment, Task, to_body, yaw_of
 
 REACH: Final = np.tile([0.15, 0.35, 0.35], 4)
-"""Offsets of abduction, hip and knee from the standing pose for an action of 1 [rad]."""
+"""Changes of abduction, hip and knee from the standing pose for an action of 1 [rad]."""
 LOW, HIGH = np.tile(RANGES, (4, 1)).T
+"""Ranges of the joints [rad], (12,) each."""
 JOINT_RATE: Final = 10.0
-"""What the joints' rates are observed in [rad/s]."""
+"""Rate in which those of the joints are observed [rad/s]."""
 TIPPED: Final = 0.5
 """Cosine of the torso's lean from the vertical below which it has tipped over."""
 GROUNDED: Final = QUADRUPED.height
@@ -25,11 +27,11 @@ GROUNDED: Final = QUADRUPED.height
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class QuadrupedConfig(Config):
-    """Settings of the quadruped.
+    """Settings of the quadruped, beside those of all environments.
 
     Attributes:
         forward: Range of the commanded velocity ahead, drawn for each episode [m/s].
-        sideways: Range of that to the left [m/s].
+        sideways: Range of the commanded velocity to the left [m/s].
         turning: Range of the commanded yaw rate [rad/s].
         spread: Error of the velocity at which its reward has fallen to 1/e [m/s].
         turning_spread: Error of the yaw rate at which its reward has fallen to 1/e [rad/s].
@@ -55,9 +57,7 @@ class QuadrupedConfig(Config):
             low, high = getattr(self, name)
             if not -3.0 <= low <= high <= 3.0:
                 raise ConfigError(f"{name} must be a range within -3 and 3, low to high, not {(low, high)}")
-        for name in ("spread", "turning_spread"):
-            if not getattr(self, name) > 0.0:
-                raise ConfigError(f"{name} must be positive, not {getattr(self, name):g}")
+        check_positive(self, ("spread", "turning_spread"), ConfigError)
 
 
 class Quadruped(Task):
@@ -92,7 +92,7 @@ class Quadruped(Task):
     felt = (parts.TORSO, *FEET)
     edge = parts.AS_MESHED
     ncommand = 3
-    naction = 12
+    naction = len(JOINTS)
     training = Training(
         steps=1_000_000,
         n_steps=48,
@@ -106,26 +106,26 @@ class Quadruped(Task):
     config: QuadrupedConfig
 
     def build(self) -> mujoco.MjSpec:
-        """See `Task`."""
+        """The quadruped, whose first keyframe stands on four bent legs."""
         return build_quadruped()
 
     def prepare(self, model: mujoco.MjModel) -> None:
-        """See `Task`."""
+        """Look up the robot's weight and its standing pose in the compiled model."""
         super().prepare(model)
         self._stance: Array = model.key_ctrl[0].copy()
 
     def start(self, rng: np.random.Generator, qpos: Array, qvel: Array) -> Array:
-        """Standing, joints off by up to 0.05 rad."""
-        qpos[7:] += rng.uniform(-0.05, 0.05, 12)
+        """Let the robot stand, joints off by up to 0.05 rad, and command velocities [m/s] and a yaw rate [rad/s]."""
+        qpos[7:] += rng.uniform(-0.05, 0.05, len(JOINTS))
         c = self.config
         return np.array([rng.uniform(*pair) for pair in (c.forward, c.sideways, c.turning)])
 
     def controls(self, action: Array, moment: Moment) -> Array:
-        """See `Task`."""
+        """Targets of the joints [rad], (n, 12), within their ranges."""
         return np.clip(self._stance + REACH * action, LOW, HIGH)
 
     def observe(self, moment: Moment) -> Array:
-        """See `Task`."""
+        """The observation of the class's table, (n, 48)."""
         turn = moment.qpos[:, 3:7]
         return np.column_stack(
             [
@@ -140,7 +140,7 @@ class Quadruped(Task):
         )
 
     def rewards(self, moment: Moment) -> dict[str, Array]:
-        """See `Task`."""
+        """Terms for velocity, turning, power, haste and tilt, (n,) each."""
         c, down = self.config, to_body(moment.qpos[:, 3:7], moment.gravity)
         return {
             "velocity": closeness(_velocity(moment) - moment.command[:, :2], c.spread),
@@ -151,12 +151,12 @@ class Quadruped(Task):
         }
 
     def failed(self, moment: Moment) -> Flags:
-        """See `Task`."""
+        """Whether the torso has tipped over or is down on the ground, (n,)."""
         upright = -to_body(moment.qpos[:, 3:7], moment.gravity)[:, 2]
         return (upright < TIPPED) | (moment.qpos[:, 2] < GROUNDED)
 
     def measures(self, moment: Moment) -> dict[str, Array]:
-        """See `Task`."""
+        """Velocity ahead and to the left, yaw rate, error, height and tilt, as the class says, (n,) each."""
         ahead, sideways = _velocity(moment).T
         down = to_body(moment.qpos[:, 3:7], moment.gravity)
         return {
@@ -174,7 +174,7 @@ class Quadruped(Task):
 
 
 def closeness(error: Array, spread: float) -> Array:
-    """1 where the error (n, k) is zero, 1/e where it is as large as the spread."""
+    """Reward that is 1 where the error (n, k) is zero and 1/e where it is as large as the spread, (n,)."""
     value: Array = np.exp(-(error**2).sum(axis=1) / spread**2)
     return value
 

@@ -13,14 +13,17 @@ from rftsim_envs.recipe import Training
 from rftsim_envs.task import Config, ConfigError, Moment, Task, to_body, yaw_of
 
 RADIUS: Final = ROVER.wheel.outer_radius
+"""Outer radius of the wheels [m]."""
 TOP_SPEED: Final = ROVER.rate * RADIUS
-"""Of the rims; what speeds are observed and rewarded in [m/s]."""
+"""Largest speed of the rims [m/s], in which observation and reward count speeds."""
 DOWN: Final = np.array([0.0, 0.0, -1.0])
+"""Direction into the ground, whatever its slope, (3,)."""
 SIDES: Final = np.array([1 if "left" in wheel else -1 for wheel in WHEELS])
+"""Side of each wheel, 1 on the left and -1 on the right, (6,)."""
 CREEP: Final = 0.05
 """Speed at which slip counts as digging by half [m/s]."""
 ARRIVED: Final = 0.2
-"""Distance to the goal [m]."""
+"""Distance to the goal within which it is reached [m]."""
 TIPPED: Final = 0.5
 """Cosine of the torso's lean from the ground's normal below which it has tipped over."""
 BURIED: Final = 0.2
@@ -29,7 +32,7 @@ BURIED: Final = 0.2
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class RoverConfig(Config):
-    """Settings of the rover.
+    """Settings of the rover, beside those of all environments.
 
     Attributes:
         distance: Range of the goal's distance, drawn for each episode [m].
@@ -106,23 +109,23 @@ class Rover(Task):
         return spec
 
     def prepare(self, model: mujoco.MjModel) -> None:
-        """See `Task`."""
+        """Look up the robot's weight, its wheels' rates and its hubs' heights in the compiled model."""
         super().prepare(model)
         self._rates = [model.joint(wheel).dofadr[0] for wheel in WHEELS]
         self._heights = [model.sensor(f"{wheel}_hub").adr[0] + 2 for wheel in WHEELS]
 
     def start(self, rng: np.random.Generator, qpos: Array, qvel: Array) -> Array:
-        """At rest on the ground; the command is the goal's place."""
+        """Leave the rover at rest on the ground; the command is the goal's place along x and y [m]."""
         sector = np.deg2rad(self.config.sector_deg)
         distance, bearing = rng.uniform(*self.config.distance), rng.uniform(-sector, sector)
         return np.array([distance * np.cos(bearing), distance * np.sin(bearing)])
 
     def controls(self, action: Array, moment: Moment) -> Array:
-        """See `Task`."""
+        """Rates of the wheels [rad/s], (n, 6): those of a side share one."""
         return ROVER.rate * np.where(SIDES > 0, action[:, :1], action[:, 1:])
 
     def observe(self, moment: Moment) -> Array:
-        """See `Task`."""
+        """The observation of the class's table, (n, 26)."""
         turn, away = moment.qpos[:, 3:7], moment.command - moment.qpos[:, :2]
         bearing = np.arctan2(away[:, 1], away[:, 0]) - yaw_of(turn)
         velocity, rates = to_body(turn, moment.qvel[:, :3]), moment.qvel[:, self._rates]
@@ -141,7 +144,7 @@ class Rover(Task):
         )
 
     def rewards(self, moment: Moment) -> dict[str, Array]:
-        """See `Task`."""
+        """Terms for progress, arrival, power and digging, (n,) each."""
         c, speed = self.config, self.speed(moment)
         slip_speed = RADIUS * moment.qvel[:, self._rates] - self._passing(moment)
         return {
@@ -152,17 +155,17 @@ class Rover(Task):
         }
 
     def failed(self, moment: Moment) -> Flags:
-        """See `Task`."""
+        """Whether the torso has tipped over or a wheel is dug in, (n,)."""
         upright = -to_body(moment.qpos[:, 3:7], np.broadcast_to(DOWN, (len(moment.qpos), 3)))[:, 2]
         return (upright < TIPPED) | (self._lowest(moment) < BURIED * RADIUS)
 
     def reached(self, moment: Moment) -> Flags:
-        """See `Task`."""
-        away: Flags = self._distance(moment) < ARRIVED
-        return away
+        """Whether the torso is within ARRIVED of the goal, (n,)."""
+        arrived: Flags = self._distance(moment) < ARRIVED
+        return arrived
 
     def measures(self, moment: Moment) -> dict[str, Array]:
-        """See `Task`."""
+        """Speed [m/s], distance to the goal [m], slip [-] and sinkage [m], (n,) each."""
         rim, passing = RADIUS * moment.qvel[:, self._rates], self._passing(moment)
         faster = np.maximum(np.maximum(np.abs(rim), np.abs(passing)), 1e-3)
         slip: Array = ((rim - passing) / faster).mean(axis=1)
@@ -192,17 +195,17 @@ class Rover(Task):
 
 
 def progress(before: Array, after: Array, goal: Array) -> Array:
-    """How much nearer the goal has come [m]: (n, 2) each."""
+    """How much nearer to the goal a step has led [m], (n,), from places (n, 2)."""
     return length(goal - before) - length(goal - after)
 
 
 def length(vector: Array) -> Array:
-    """Of vectors (n, 2), (n,)."""
+    """Lengths of vectors (n, 2) in the plane, (n,)."""
     value: Array = np.hypot(vector[:, 0], vector[:, 1])
     return value
 
 
 def digging(slip_speed: Array, speed: Array) -> Array:
-    """Mean slip speed of the wheels (n, 6), which counts where the rover stands [m/s]."""
+    """Mean slip speed of the wheels [m/s], (n,), which counts the less the faster the rover moves."""
     mean: Array = np.abs(slip_speed).mean(axis=1)
     return mean / (1.0 + (speed / CREEP) ** 2)

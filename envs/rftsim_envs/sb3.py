@@ -1,4 +1,4 @@
-"""Many environments on `mujoco.batch`, for Stable-Baselines3."""
+"""A vector environment of Stable-Baselines3 on `mujoco.batch`."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -24,15 +24,14 @@ class SandVecEnv(VecEnv):
     `TimeLimit.truncated`, and in `episode` what it came to, as `rftsim_envs.tally.Tally.take` has it.
 
     Args:
-        task: One of `rftsim_envs.TASKS`.
-        n_envs: How many.
-        threads: 0 for as many as there are processors.
+        task: Name of one of `rftsim_envs.TASKS`.
+        n_envs: Number of simulations.
+        threads: Number of threads; 0 for as many as there are processors.
         **settings: Fields of the task's Config.
 
     Attributes:
-        rngs: The generators of the simulations' episodes.
-        outcome: What the last step gave, before new episodes began.
-        measured: Names of the numbers in `episode`, once there was a step.
+        rngs: Generators from which each simulation's episodes are drawn.
+        outcome: Outcome of the last step, before new episodes began.
 
     Raises:
         ConfigError: No such task or setting.
@@ -52,7 +51,7 @@ class SandVecEnv(VecEnv):
 
     @property
     def measured(self) -> list[str]:
-        """See above."""
+        """Names of the numbers in `episode` beside `r` and `l`; none before the first step."""
         return self._tally.names
 
     def reset(self) -> Observation:
@@ -67,11 +66,11 @@ class SandVecEnv(VecEnv):
         return self.episodes.observation()
 
     def step_async(self, actions: Action) -> None:
-        """Say what to do next."""
+        """Keep the actions, (n_envs, naction), for `step_wait`."""
         self._action = actions
 
     def step_wait(self) -> VecEnvStepReturn:
-        """Go on by one control step."""
+        """Go on by one control step; where an episode ends, begin the next one."""
         out = self.outcome = self.episodes.step(self._action)
         self._tally.add(out)
         observation, done = out.observation, out.terminated | out.truncated
@@ -87,7 +86,7 @@ class SandVecEnv(VecEnv):
         return observation, out.reward.astype(np.float32), done, infos
 
     def close(self) -> None:
-        """Nothing is held."""
+        """Do nothing, as there is nothing to let go of."""
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
         """An attribute, the same for all simulations."""
@@ -110,11 +109,11 @@ class SandVecEnv(VecEnv):
     def env_is_wrapped(
         self, wrapper_class: type[gym.Wrapper[Any, Any, Any, Any]], indices: VecEnvIndices = None
     ) -> list[bool]:
-        """They are wrapped by nothing; returns and lengths are counted here, as SB3's Monitor does."""
+        """Whether the wrapper is SB3's Monitor, whose counts of returns and lengths are made here; nothing wraps."""
         from stable_baselines3.common.monitor import Monitor
 
         return [issubclass(wrapper_class, Monitor) for _ in self._get_indices(indices)]
 
     def get_images(self) -> Sequence["NDArray[np.uint8] | None"]:
-        """No pictures; `SandEnv` draws them."""
+        """None for each simulation, since only `SandEnv` draws pictures."""
         return [None] * self.num_envs

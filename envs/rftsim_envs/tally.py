@@ -1,4 +1,4 @@
-"""What episodes come to: return, length, and the mean of everything in `info`."""
+"""Sums over episodes: return, length, and the mean of everything in `info`."""
 
 from typing import Final
 
@@ -8,7 +8,7 @@ from rftsim_envs.episodes import Outcome
 from rftsim_envs.physics import Array, Flags
 
 LAST: Final = ("cost_of_transport", "diverged", "reached")
-"""Of these, the value at the episode's end counts."""
+"""Names of what counts with its value at the episode's end, not with its mean."""
 
 
 class Tally:
@@ -20,7 +20,7 @@ class Tally:
 
     @property
     def names(self) -> list[str]:
-        """Of what is counted beside return and length."""
+        """Names of what is counted beside return and length."""
         return list(self._sums)
 
     def add(self, outcome: Outcome, counted: "Flags | None" = None) -> None:
@@ -33,7 +33,7 @@ class Tally:
             np.copyto(sums, values if name in LAST else sums + values.astype(float), where=share)
 
     def take(self, i: int) -> dict[str, float]:
-        """What simulation i's episode came to; the next one starts from nothing.
+        """Give what simulation i's episode came to, and let its next one start from nothing.
 
         `r` return, `l` control steps, `reward/...` each term's share of the return, and means over the episode (of
         `LAST`, the last value).

@@ -1,9 +1,9 @@
-"""What a task is: a robot, what it is told and asked, and what that is worth; for n simulations side by side."""
+"""Tasks: a robot, what it is told and asked, and what that is worth, for n simulations side by side."""
 
 import abc
 import dataclasses
 import math
-from typing import Any, ClassVar, Literal, NamedTuple, get_args, get_origin, get_type_hints
+from typing import Any, ClassVar, Literal, NamedTuple
 
 import mujoco
 import numpy as np
@@ -12,6 +12,7 @@ from rftsim.errors import RftsimError
 from rftsim.sand.presets import make_sand
 from rftsim_envs.physics import Array, Flags
 from rftsim_envs.recipe import Drive, Training
+from rftsim_envs.settings import check_positive, convert_fields
 
 
 class ConfigError(RftsimError, ValueError):
@@ -32,9 +33,9 @@ class Config:
             can move in. The ground stays z = 0 and gravity leans.
         observe_ground: Let the observation end with the ground's draw: log of both factors, and the sines of the slope
             along x and y. Otherwise it is hidden.
-        timestep: Of the physics [s].
-        period: Of control [s]; a multiple of the timestep.
-        duration: Of an episode, after which it is truncated [s].
+        timestep: Time step of the physics [s].
+        period: Duration of a control step [s]; a multiple of the timestep.
+        duration: Duration of an episode, after which it is truncated [s].
     """
 
     ground: Literal["sand", "rigid"] = "sand"
@@ -49,15 +50,12 @@ class Config:
     duration: float = 10.0
 
     def __post_init__(self) -> None:
-        for name, kind in get_type_hints(type(self)).items():
-            object.__setattr__(self, name, _checked(name, kind, getattr(self, name)))
+        convert_fields(self, ConfigError)
         for name in ("strength", "friction"):
             low, high = getattr(self, name)
             if not 0.0 < low <= high:
                 raise ConfigError(f"{name} must be a range of positive factors, low to high, not {(low, high)}")
-        for name in ("timestep", "period", "duration"):
-            if not getattr(self, name) > 0.0:
-                raise ConfigError(f"{name} must be positive, not {getattr(self, name):g}")
+        check_positive(self, ("timestep", "period", "duration"), ConfigError)
         if not 0.0 <= self.slope_deg < 45.0:
             raise ConfigError(f"slope_deg must be at least 0 and below 45, not {self.slope_deg:g}")
         if not math.isclose(self.substeps * self.timestep, self.period, rel_tol=1e-9) or self.substeps < 1:
@@ -66,69 +64,38 @@ class Config:
 
     @property
     def substeps(self) -> int:
-        """Time steps in a control step."""
+        """Number of time steps in a control step."""
         return round(self.period / self.timestep)
 
     @property
     def steps(self) -> int:
-        """Control steps in an episode."""
+        """Number of control steps in an episode, at least 1."""
         return max(round(self.duration / self.period), 1)
-
-
-def _checked(name: str, kind: Any, value: Any) -> Any:
-    """A setting as the type it must have; numbers may come as text, as from a command line."""
-    if get_origin(kind) is Literal:
-        if value not in get_args(kind):
-            raise ConfigError(f"{name} must be {' or '.join(map(repr, get_args(kind)))}, not {value!r}")
-        return value
-    try:
-        if get_origin(kind) is tuple:
-            parts = value.split(",") if isinstance(value, str) else list(value)
-            if len(parts) != len(get_args(kind)):
-                raise ValueError
-            return tuple(_number(part) for part in parts)
-        if kind is float:
-            return _number(value)
-        if kind is bool and str(value).lower() in ("true", "false"):
-            return str(value).lower() == "true"
-        if kind is str and isinstance(value, str):
-            return value
-    except (TypeError, ValueError):
-        pass  # said below
-    wanted = {float: "a finite number", bool: "true or false", str: "text"}.get(kind, "numbers: low,high")
-    raise ConfigError(f"{name} must be {wanted}, not {value!r}")
-
-
-def _number(value: Any) -> float:
-    number = float(value)
-    if isinstance(value, bool) or not math.isfinite(number):
-        raise ValueError
-    return number
 
 
 class Moment(NamedTuple):
     """The end of a control step, of n simulations."""
 
     before: Array
-    """qpos at the step's start; at an episode's start, qpos. (n, nq)."""
+    """Positions at the step's start, and at an episode's start those of now, (n, nq)."""
     qpos: Array
-    """(n, nq)."""
+    """Positions, (n, nq)."""
     qvel: Array
-    """(n, nv)."""
+    """Velocities, (n, nv)."""
     sensors: Array
-    """Sensor values at the start of the last time step, (n, nsensordata)."""
+    """Values of the sensors at the start of the last time step, (n, nsensordata)."""
     gravity: Array
     """Unit vector downward, (n, 3)."""
     command: Array
-    """(n, ncommand)."""
+    """Numbers that tell what is asked in this episode, (n, ncommand)."""
     action: Array
-    """The action taken, within -1 and 1; zero at an episode's start. (n, naction)."""
+    """Action that was taken, within -1 and 1, and zero at an episode's start, (n, naction)."""
     last: Array
-    """The one before."""
+    """Action of the control step before, (n, naction)."""
     power: Array
-    """Positive power of the actuators, mean over the step [W], (n,)."""
+    """Mean positive power of the actuators over the step [W], (n,)."""
     period: float
-    """Of control [s]."""
+    """Duration of the control step [s]."""
 
 
 class Task(abc.ABC):
@@ -137,13 +104,14 @@ class Task(abc.ABC):
     A task holds no state of an episode: its methods take `Moment`s of n simulations and return arrays (n, ...).
 
     Attributes:
-        Settings: Its Config.
+        Settings: Class of its configuration.
         felt: Bodies that feel the sand; None for all that can.
         planar: Whether the robot moves in the x-z plane.
-        edge: Longest edge of a felt triangle [m]; None for `add_sand`'s.
-        ncommand: Numbers in a command.
-        weight: Of the robot, once it is prepared [N].
-        training: How a policy is trained.
+        edge: Longest edge of a felt triangle [m]; None for the one that `add_sand` chooses.
+        ncommand: Number of numbers in a command.
+        config: Its configuration.
+        weight: Weight of the robot, once the task is prepared [N].
+        training: Settings by which a policy is trained.
     """
 
     Settings: ClassVar[type[Config]] = Config
@@ -157,12 +125,12 @@ class Task(abc.ABC):
         self.config = config
 
     def options(self) -> dict[str, Any]:
-        """More options of `add_sand`."""
+        """Options of `add_sand` beyond those that the configuration and this class state."""
         return {}
 
     @abc.abstractmethod
     def build(self) -> mujoco.MjSpec:
-        """The robot without ground, whose first keyframe is where an episode starts."""
+        """The robot without ground; its first keyframe is where an episode starts."""
 
     def prepare(self, model: mujoco.MjModel) -> None:
         """Look up in the compiled model what the methods below need."""
@@ -171,11 +139,11 @@ class Task(abc.ABC):
     @property
     @abc.abstractmethod
     def naction(self) -> int:
-        """Numbers in an action."""
+        """Number of numbers in an action of one simulation."""
 
     @abc.abstractmethod
     def start(self, rng: np.random.Generator, qpos: Array, qvel: Array) -> Array:
-        """Vary the start of one episode, in place: (nq,), (nv,). Returns its command, (ncommand,)."""
+        """Vary the start of one episode, (nq,) and (nv,), in place, and return its command, (ncommand,)."""
 
     @abc.abstractmethod
     def controls(self, action: Array, moment: Moment) -> Array:
@@ -183,18 +151,18 @@ class Task(abc.ABC):
 
     @abc.abstractmethod
     def observe(self, moment: Moment) -> Array:
-        """What a policy sees, (n, nobservation)."""
+        """Observation that a policy gets, without the ground's draw, (n, nobservation)."""
 
     @abc.abstractmethod
     def rewards(self, moment: Moment) -> dict[str, Array]:
-        """The reward's terms, (n,) each, per second."""
+        """Terms of the reward by name, (n,) each; their sum is the reward per second."""
 
     def failed(self, moment: Moment) -> Flags:
-        """Where the episode ends early, (n,)."""
+        """Whether the episode ends early in failure, (n,); never unless a task says so."""
         return np.zeros(len(moment.qpos), dtype=bool)
 
     def reached(self, moment: Moment) -> Flags:
-        """Where it ends early in success, (n,)."""
+        """Whether the episode ends early in success, (n,); never unless a task says so."""
         return np.zeros(len(moment.qpos), dtype=bool)
 
     @abc.abstractmethod
@@ -211,7 +179,7 @@ class Task(abc.ABC):
 
 
 def make_config(task: type[Task], settings: dict[str, Any]) -> Config:
-    """A task's configuration.
+    """The configuration of a task, with these settings in place of its own.
 
     Raises:
         ConfigError: There is no such setting, or its value cannot be.

@@ -1,4 +1,4 @@
-"""The tasks by name."""
+"""All tasks by name, and how to make one."""
 
 from typing import Any, Final
 
@@ -16,7 +16,7 @@ TASKS: Final[dict[str, type[Task]]] = {
 
 
 def make(name: str, settings: dict[str, Any]) -> Task:
-    """A task with its settings.
+    """A task by name, with these settings in place of its own.
 
     Raises:
         ConfigError: No such task or setting, or a value that cannot be.

@@ -1,4 +1,4 @@
-"""Many environments on `mujoco.batch`, for Gymnasium."""
+"""A vector environment of Gymnasium on `mujoco.batch`."""
 
 from typing import Any
 
@@ -21,9 +21,9 @@ class SandVectorEnv(VectorEnv[Observation, Action, NDArray[np.generic]]):
     followed by the next one in the same step, and its end is in `final_obs` and `final_info`.
 
     Args:
-        task: One of `rftsim_envs.TASKS`.
-        num_envs: How many.
-        threads: 0 for as many as there are processors.
+        task: Name of one of `rftsim_envs.TASKS`.
+        num_envs: Number of simulations.
+        threads: Number of threads; 0 for as many as there are processors.
         **settings: Fields of the task's Config.
 
     Raises:
@@ -59,7 +59,7 @@ class SandVectorEnv(VectorEnv[Observation, Action, NDArray[np.generic]]):
         return self.episodes.observation(), _masked(self.episodes.info(), np.ones(self.num_envs, dtype=bool))
 
     def step(self, actions: ArrayLike) -> tuple[Observation, Array, Flags, Flags, dict[str, Any]]:
-        """Go on by one control step."""
+        """Go on by one control step with actions, (num_envs, naction); where an episode ends, begin the next one."""
         out = self.episodes.step(actions)
         observation, ended = out.observation, out.terminated | out.truncated
         info = _masked(out.info, ~ended)

@@ -15,12 +15,12 @@ GROUPS: Final = {"speed": "motion", "command": "motion", "slip": "slip", "power"
 
 
 class Watch:
-    """Records one simulation.
+    """A recorder of one simulation, which closes as a context.
 
     Args:
-        episodes: Those of an environment: `env.episodes`.
-        path: The file, `*.rrd`.
-        i: Which simulation.
+        episodes: Episodes of an environment: `env.episodes`.
+        path: The file to write, `*.rrd`.
+        i: Number of the simulation.
         fps: Frames per second of simulated time; by default one per control step.
 
     Raises:
@@ -36,12 +36,12 @@ class Watch:
         """Record the moment after a control step.
 
         Args:
-            info: What the step told: `info` of one environment or of a vector one, or `Outcome.info`.
+            info: Info of the step: `info` of one environment or of a vector one, or `Outcome.info`.
         """
         self.recorder.log(self._physics.snapshot(self._i), scalars(info, self._i))
 
     def close(self) -> None:
-        """Write the file."""
+        """Write the rest of the recording to its file."""
         self.recorder.close()
 
     def __enter__(self) -> Self:
@@ -54,7 +54,7 @@ class Watch:
 
 
 def scalars(info: Mapping[str, Any], i: int = 0) -> dict[str, float]:
-    """The numbers in `info` of simulation i, by path."""
+    """The numbers in `info` of simulation i, by their path in the recording."""
     found = {}
     for name, value in info.items():
         values = np.atleast_1d(value)

@@ -110,7 +110,7 @@ GROUSER_WHEEL: Final = WheelParameters(
 """[Agarwal] Table 4.1: the grousered wheel on its gravity-compensated carriage."""
 
 HALF_GROUSER_WHEEL: Final = GROUSER_WHEEL.scaled(0.5, width=0.070)
-"""Its half-size twin of [Agarwal] appendix B.1: lengths halved, masses an eighth."""
+"""Half-size twin of the grousered wheel, [Agarwal] appendix B.1: lengths halved, masses an eighth."""
 
 FOUR_FLAP_RUNNER: Final = WheelParameters(
     radius=0.025,

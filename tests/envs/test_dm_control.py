@@ -106,6 +106,28 @@ def test_a_steady_rate_slips_as_in_the_scene(domain, scene):
     assert slip == pytest.approx(there, abs=0.01 * (1 - there))
 
 
+def test_rewards_are_the_gymnasium_tasks_within_0_and_1():
+    """By hand, of speed v, command c, rim R w, power P of drive and push, and weight m g, as the tables say."""
+    rewards = {"follow": [], "run": []}
+    for domain, task in dm.ALL_TASKS:
+        env = dm.load(domain, task, {"random": 1, "random_sand": True})
+        env.reset()
+        for action in some_actions(env, 20):
+            reward = env.step(action).reward
+            p = env.physics
+            weight = float(p.model.body_mass.sum()) * 9.8 if task == "run" else GROUSER_WHEEL.vertical_mass * 9.8
+            power = max(p.power(), 0.0) + max(p.data.ctrl[1] * p.speed(), 0.0)
+            unit = np.sqrt(9.8 * 2 * p.radius())
+            expected = p.speed() / unit - (power / (weight * unit)) ** 2
+            if task == "follow":
+                slip = (p.radius() * p.rate() - p.speed()) / 0.5
+                near = np.exp(-abs(p.speed() - env.task.commanded_speed) / 0.15)
+                expected = near - 0.1 * slip**2 - 0.2 * power / (weight * 0.5)
+            assert reward == pytest.approx(min(max(expected, 0.0), 1.0), rel=1e-6, abs=1e-9)
+            rewards[task].append(reward)
+    assert min(np.ptp(found) for found in rewards.values()) > 0.1
+
+
 def test_drive_and_push_pay_for_the_sand():
     """At a steady rate nothing is stored: drive + push + sand = 0 in the mean."""
     env = dm.load("grouser_wheel", "follow", {"random": 1})
@@ -147,15 +169,14 @@ def test_copies_pickles_and_reloads_go_on_alike():
 
 
 def test_random_sand_is_drawn_within_its_range():
-    from rftsim_envs.dm.grouser_wheel import GROUND
     from rftsim_envs.dm.wheel import STRENGTH
 
     env = dm.load("grouser_wheel", "follow", {"random": 1, "random_sand": True})
     (bed,) = rftsim.instances(env.physics.model.ptr)
-    drawn = []
+    own, drawn = rftsim.make_sand("poppy-seeds"), []
     for _ in range(20):
         env.reset()
-        drawn.append(bed.sand[XI_N] / GROUND.sand.xi_n)
+        drawn.append(bed.sand[XI_N] / own.xi_n)
     assert STRENGTH[0] <= min(drawn) < 0.8 < 1.3 < max(drawn) <= STRENGTH[1]
 
 

@@ -13,7 +13,7 @@ from rftsim.law.laws import Law
 from rftsim.model.add_sand import add_sand
 from rftsim.sand.medium import Sand
 
-_SAND = ((0.78, 0.71, 0.52), (0.72, 0.64, 0.45))
+_SAND_RGB = ((0.78, 0.71, 0.52), (0.72, 0.64, 0.45))
 _ALPHA = 0.7
 
 
@@ -70,7 +70,14 @@ class SandArena(composer.Arena):
             width=256, height=256,
         )  # fmt: skip
         checker = root.asset.add(
-            "texture", name="sand", type="2d", builtin="checker", rgb1=_SAND[0], rgb2=_SAND[1], width=200, height=200
+            "texture",
+            name="sand",
+            type="2d",
+            builtin="checker",
+            rgb1=_SAND_RGB[0],
+            rgb2=_SAND_RGB[1],
+            width=200,
+            height=200,
         )
         material = root.asset.add(
             "material", name="sand", texture=checker, texuniform=True, texrepeat=[2, 2], rgba=[1, 1, 1, _ALPHA]
@@ -82,11 +89,11 @@ class SandArena(composer.Arena):
 
     @property
     def ground_geoms(self) -> tuple[Any, ...]:
-        """The drawn surface, which touches nothing."""
+        """The geom of the drawn surface, which touches nothing."""
         return (self._surface,)
 
     def regenerate(self, random_state: np.random.RandomState) -> None:
-        """Nothing here changes between episodes; tasks of dm_control.locomotion call this."""
+        """Change nothing between episodes, though tasks of dm_control.locomotion call this."""
 
     def before_step(self, physics: mjcf.Physics, random_state: np.random.RandomState) -> None:
         """Solve for the sand's force with the new controls.
@@ -130,7 +137,7 @@ def put_sand(tree: etree._Element, assets: Mapping[str, bytes], options: Mapping
     Args:
         tree: The document; changed in place. Its bodies have names, as dm_control gives them.
         assets: Contents of the files that it refers to.
-        options: Those of `rftsim.add_sand`.
+        options: Options of `rftsim.add_sand`.
 
     Raises:
         RftsimError: The scene cannot have sand.
@@ -152,7 +159,7 @@ def put_sand(tree: etree._Element, assets: Mapping[str, bytes], options: Mapping
 
 
 def _bodies_alone(tree: etree._Element, assets: Mapping[str, bytes]) -> mujoco.MjSpec:
-    """What the sand reads of a document, without sensors and numerics, which stand in it already, and what moves it."""
+    """A spec of what the sand reads of a document, without what stands in it already and without what moves bodies."""
     document = copy.deepcopy(tree)
     for section in ("sensor", "contact", "tendon", "actuator", "equality", "keyframe", "custom"):
         for element in document.findall(section):

@@ -5,43 +5,25 @@ from typing import Any, Final
 
 import numpy as np
 from dm_control.rl import control
-from dm_control.utils import containers, rewards
+from dm_control.utils import containers
 from rftsim_models.wheels import FOUR_FLAP_RUNNER
 
-from rftsim.sand.presets import PRESETS
 from rftsim_envs.dm import wheel
+from rftsim_envs.four_flap_runner import FourFlapRunner, RunnerConfig
 
-TIME_LIMIT: Final = 10.0
-GROUND: Final = wheel.Ground(PRESETS["poppy-seeds"].replace(lambda_=4.0), "drft2d", structural=False)
+CONFIG: Final = RunnerConfig(timestep=wheel.TIMESTEP, duration=wheel.TIME_LIMIT)
 TOP_RATE: Final = 6 * np.pi
-RUN_SPEED: Final = 1.5
-"""Speed from which the reward is 1 [m/s]."""
+"""Largest rate that can be commanded [rad/s]."""
 SUITE = containers.TaggedTasks()
 
 
 @SUITE.add()
 def run(
-    time_limit: float = TIME_LIMIT,
+    time_limit: float = CONFIG.duration,
     random: "np.random.RandomState | int | None" = None,
     random_sand: bool = False,
     environment_kwargs: Mapping[str, Any] | None = None,
 ) -> control.Environment:
-    """Run fast."""
-    physics = wheel.make_physics(FOUR_FLAP_RUNNER, GROUND, TOP_RATE)
-    return wheel.make_environment(physics, Run(GROUND, random_sand, random), time_limit, environment_kwargs)
-
-
-class Run(wheel.Task):
-    """Be fast."""
-
-    def get_reward(self, physics: wheel.Physics) -> float:
-        """Speed as a share of RUN_SPEED."""
-        return float(
-            rewards.tolerance(
-                physics.speed(),
-                bounds=(RUN_SPEED, float("inf")),
-                margin=RUN_SPEED,
-                value_at_margin=0.0,
-                sigmoid="linear",
-            )
-        )
+    """Run fast at a steady draw, as `FourFlapRunner` rewards it."""
+    task = wheel.WheelTask(FourFlapRunner(CONFIG), random_sand, random)
+    return wheel.make_environment(wheel.rate_driven(FOUR_FLAP_RUNNER, TOP_RATE), task, time_limit, environment_kwargs)

@@ -5,50 +5,49 @@ from typing import Any, Final
 
 import numpy as np
 from dm_control.rl import control
-from dm_control.utils import containers, rewards
+from dm_control.utils import containers
 from rftsim_models.wheels import GROUSER_WHEEL
 
-from rftsim.sand.presets import PRESETS
 from rftsim_envs.dm import wheel
+from rftsim_envs.grouser_wheel import GrouserWheel, WheelConfig
+from rftsim_envs.physics import Array
 
-TIME_LIMIT: Final = 10.0
-GROUND: Final = wheel.Ground(PRESETS["poppy-seeds"], "drft2d", structural=True)
+CONFIG: Final = WheelConfig(timestep=wheel.TIMESTEP, duration=wheel.TIME_LIMIT, slip=0.1)
+"""Settings of the task. Slip weighs little, as rewards end at 0: a wheel that spins shall still gain by its speed."""
 TOP_RATE: Final = 4 * np.pi
-SPEEDS: Final = (0.1, 0.5)
-"""Range of the commanded speed [m/s]."""
+"""Largest rate that can be commanded [rad/s]."""
 SUITE = containers.TaggedTasks()
 
 
 @SUITE.add()
 def follow(
-    time_limit: float = TIME_LIMIT,
+    time_limit: float = CONFIG.duration,
     random: "np.random.RandomState | int | None" = None,
     random_sand: bool = False,
     environment_kwargs: Mapping[str, Any] | None = None,
 ) -> control.Environment:
-    """Follow a speed that each episode commands."""
-    physics = wheel.make_physics(GROUSER_WHEEL, GROUND, TOP_RATE)
-    return wheel.make_environment(physics, Follow(GROUND, random_sand, random), time_limit, environment_kwargs)
+    """Follow a speed that each episode commands, as `GrouserWheel` rewards it."""
+    task = Follow(GrouserWheel(CONFIG), random_sand, random)
+    return wheel.make_environment(wheel.rate_driven(GROUSER_WHEEL, TOP_RATE), task, time_limit, environment_kwargs)
 
 
-class Follow(wheel.Task):
-    """Hold a commanded speed, with little slip."""
+class Follow(wheel.WheelTask):
+    """A commanded speed to hold with little slip, without a drawbar load."""
 
     commanded_speed = 0.0
+    """Speed that this episode commands [m/s]."""
+
+    def command(self) -> Array:
+        """Commanded speed [m/s] and no drawbar load [N], (2,)."""
+        return np.array([self.commanded_speed, 0.0])
 
     def initialize_episode(self, physics: wheel.Physics) -> None:
-        """Draw the commanded speed [m/s]."""
-        self.commanded_speed = self.random.uniform(*SPEEDS)
+        """Draw the commanded speed, then start near rolling."""
+        self.commanded_speed = self.random.uniform(*CONFIG.speed)
         super().initialize_episode(physics)
 
     def get_observation(self, physics: wheel.Physics) -> wheel.Observation:
-        """The wheel's motion and what is commanded."""
+        """The wheel's motion, the sand's force and the commanded speed, in SI units."""
         observation = super().get_observation(physics)
         observation["commanded_speed"] = np.array([self.commanded_speed])
         return observation
-
-    def get_reward(self, physics: wheel.Physics) -> float:
-        """Closeness to the commanded speed, of which a quarter needs low slip."""
-        close = rewards.tolerance(physics.speed() - self.commanded_speed, bounds=(-0.01, 0.01), margin=0.1)
-        grip = rewards.tolerance(physics.slip(), bounds=(-0.2, 0.2), margin=0.4)
-        return float(close * (3 + grip) / 4)

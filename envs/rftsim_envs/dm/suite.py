@@ -1,4 +1,4 @@
-"""The tasks by name, as `dm_control.suite` has them."""
+"""All tasks by name, as `dm_control.suite` has them."""
 
 from collections.abc import Mapping
 from typing import Any, Final
@@ -8,7 +8,7 @@ from dm_control.rl import control
 from rftsim_envs.dm import four_flap_runner, grouser_wheel
 
 DOMAINS: Final = {"four_flap_runner": four_flap_runner.SUITE, "grouser_wheel": grouser_wheel.SUITE}
-"""The tasks of each domain."""
+"""Tasks of each domain, by name."""
 ALL_TASKS: Final = tuple((domain, task) for domain, tasks in DOMAINS.items() for task in tasks)
 """Every (domain name, task name)."""
 
@@ -20,7 +20,7 @@ def load(
     environment_kwargs: Mapping[str, Any] | None = None,
     visualize_reward: bool = False,
 ) -> control.Environment:
-    """An environment by name.
+    """Load an environment by the names of its domain and task.
 
     Args:
         domain_name: Name of a domain.

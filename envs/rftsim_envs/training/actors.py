@@ -1,4 +1,4 @@
-"""What chooses actions: a trained policy, or what it is compared with."""
+"""Actors, which choose actions: a trained policy, or what it is compared with."""
 
 from collections.abc import Callable
 from typing import Any
@@ -16,13 +16,13 @@ from rftsim_envs.recipe import Drive, TrainingError
 from rftsim_envs.training.folder import Folder
 
 Actor = Callable[[Observation, float], NDArray[Any]]
-"""Actions (n, naction) from what is seen, (n, nobservation), and the time since the episodes' start [s]."""
+"""Actions (n, naction) as a function of what is seen, (n, nobservation), and the time since the start [s]."""
 Maker = Callable[[Episodes], Actor]
-"""An actor for some episodes."""
+"""An actor as a function of the episodes that it acts in."""
 
 
 def trained(folder: Folder) -> Maker:
-    """The policy of a run, without its noise; that of the checkpoint where the run is not finished."""
+    """A maker of actors by the policy of a run, without its noise; that of the checkpoint where it is not finished."""
     path = folder.policy if folder.policy.is_file() else folder.checkpoint
     training = folder.plan().training
 
@@ -47,7 +47,7 @@ def trained(folder: Folder) -> Maker:
 
 
 def at_random(seed: int) -> Maker:
-    """Actions drawn anew in each step, evenly between -1 and 1."""
+    """A maker of actors whose actions are drawn anew in each step, evenly between -1 and 1."""
 
     def make(episodes: Episodes) -> Actor:
         rng, naction = np.random.default_rng(seed), episodes.task.naction
@@ -57,10 +57,10 @@ def at_random(seed: int) -> Maker:
 
 
 def zero(episodes: Episodes) -> Actor:
-    """No action."""
+    """An actor whose actions are all zero."""
     return lambda seen, time: np.zeros((len(seen), episodes.task.naction))
 
 
 def open_loop(drive: Drive) -> Maker:
-    """A drive that sees nothing, the same in all simulations."""
+    """A maker of actors by a drive that sees nothing, the same in all simulations."""
     return lambda episodes: lambda seen, time: np.tile(drive(time), (len(seen), 1))

@@ -21,13 +21,13 @@ def make_plans(
     vary: Mapping[str, Sequence[str]],
     algo: str = "ppo",
 ) -> dict[str, Plan]:
-    """Plans by folder, `KEY=VALUE,.../seed-N`.
+    """The plans of several runs by folder, `KEY=VALUE,.../seed-N`.
 
     Args:
         env: `rftsim/NAME-v0`, or NAME.
         settings: Settings of the task, the same in all runs.
         changes: Settings of the training, the same in all runs.
-        seeds: Of the runs.
+        seeds: Seeds of the runs, each of which is trained with every combination.
         vary: Settings of the task with the values that they take, in all combinations.
         algo: One of `ALGORITHMS`.
 
@@ -52,8 +52,8 @@ def train_all(
     """Train on Ray, a task for each run, with one thread; a run whose worker dies goes on from its checkpoint.
 
     Args:
-        plans: By folder in `out`.
-        out: Where all workers can write.
+        plans: Plans by folder in `out`.
+        out: A folder where all workers can write.
         ray: `local`, or the address of a cluster.
         report: Called with each run that is finished.
     """
@@ -61,9 +61,9 @@ def train_all(
     for name, trained in finished.items():
         report(name, trained)
     jobs = {name: (plan, (out / name).resolve()) for name, plan in plans.items() if name not in finished}
-    found = finished | (spread(_alone, jobs, ray, report) if jobs else {})
+    found = finished | (spread(_train_alone, jobs, ray, report) if jobs else {})
     return {name: found[name] for name in plans}
 
 
-def _alone(plan: Plan, path: Path) -> Trained:
+def _train_alone(plan: Plan, path: Path) -> Trained:
     return train(plan, path, threads=1)

@@ -1,4 +1,4 @@
-"""How good a policy is, on which ground."""
+"""Scores: how good a policy is on which ground."""
 
 import dataclasses
 import json
@@ -19,13 +19,13 @@ from rftsim_envs.training import actors
 from rftsim_envs.training.folder import Folder, Plan
 
 LEVEL: Final[Mapping[str, Any]] = {"ground": "sand", "strength": (1.0, 1.0), "friction": (1.0, 1.0), "slope_deg": 0.0}
-"""The task's own sand, alike in all episodes."""
+"""Settings of the task's own sand, level and alike in all episodes."""
 PRESETS: Final = ("poppy-seeds", "close-poppy-seeds", "glass-beads", "medium-sand")
 POLICY: Final = "policy"
 RANDOM: Final = "random"
 OPEN_LOOP: Final = "open loop"
 SEARCHED: Final = 4
-"""Episodes by which the best of the drives is found."""
+"""Number of episodes by which the best of the drives is found."""
 AS_TRAINED: Final = "as trained"
 GROUNDS: Final[Mapping[str, Mapping[str, Any]]] = {
     AS_TRAINED: {},
@@ -37,25 +37,27 @@ GROUNDS: Final[Mapping[str, Mapping[str, Any]]] = {
     **{preset: {**LEVEL, "sand": preset} for preset in PRESETS},
     "rigid": {**LEVEL, "ground": "rigid"},
 }
-"""Settings by the name of the ground."""
+"""Settings of each ground by its name."""
 
 
 class Score(NamedTuple):
-    """What an actor reached on a ground."""
+    """Score of an actor on a ground."""
 
     ground: str
+    """Name of the ground, one of `GROUNDS`."""
     actor: str
+    """Kind of the actor: `POLICY`, `RANDOM` or `OPEN_LOOP`."""
     episodes: list[dict[str, float]]
-    """Of each episode, as `Tally.take` has it, and `early`: whether it ended before its time without success."""
+    """Numbers of each episode as `Tally.take` gives them, and `early`: whether it ended too soon, without success."""
     which: str = ""
-    """The best of the drives that see nothing."""
+    """Name of the best drive that sees nothing, where that is the actor."""
 
     def mean(self, name: str) -> float:
-        """Of a number over the episodes; nan where it is not measured."""
+        """Mean of a number over the episodes, nan where it is not measured."""
         return float(np.mean([episode.get(name, np.nan) for episode in self.episodes]))
 
     def std(self, name: str) -> float:
-        """Its standard deviation."""
+        """Standard deviation of a number over the episodes, nan where it is not measured."""
         return float(np.std([episode.get(name, np.nan) for episode in self.episodes]))
 
 
@@ -94,7 +96,7 @@ def grid(plan: Plan) -> list[str]:
 def play(
     task: str, settings: Mapping[str, Any], maker: actors.Maker, n: int, *, seed: int, threads: int = 0
 ) -> list[dict[str, float]]:
-    """Play n episodes side by side, episode i seeded with seed + i; what each came to."""
+    """Play n episodes side by side, episode i seeded with seed + i, and return what each came to."""
     asked = tasks.make(task, dict(settings))
     episodes = Episodes(asked, Many(ground.lay(asked), n, threads))
     actor, tally, running = maker(episodes), Tally(n), np.ones(n, dtype=bool)
@@ -112,10 +114,10 @@ def play(
 
 
 def score(path: "str | Path", name: str, n: int, seed: int, threads: int = 0, baselines: bool = False) -> list[Score]:
-    """A run's policy on a ground, and with `baselines` random actions and the best drive that sees nothing.
+    """Score a run's policy on a ground, and with `baselines` random actions and the best drive that sees nothing.
 
     Returns:
-        Nothing where the ground cannot be had under the run's law.
+        A score for each actor; none where the ground cannot be had under the run's law.
     """
     folder = Folder(path)
     plan = folder.plan()
@@ -123,11 +125,13 @@ def score(path: "str | Path", name: str, n: int, seed: int, threads: int = 0, ba
     if settings is None:
         return []
     found = [Score(name, POLICY, play(plan.task, settings, actors.trained(folder), n, seed=seed, threads=threads))]
-    return found + (compared(plan.task, settings, name, n, seed=seed, threads=threads) if baselines else [])
+    return found + (score_baselines(plan.task, settings, name, n, seed=seed, threads=threads) if baselines else [])
 
 
-def compared(task: str, settings: Mapping[str, Any], name: str, n: int, *, seed: int, threads: int = 0) -> list[Score]:
-    """What a policy has to beat: random actions, and the best of the task's drives that see nothing."""
+def score_baselines(
+    task: str, settings: Mapping[str, Any], name: str, n: int, *, seed: int, threads: int = 0
+) -> list[Score]:
+    """Score those whom a policy has to beat: random actions, and the best of the task's drives that see nothing."""
     found = [Score(name, RANDOM, play(task, settings, actors.at_random(seed), n, seed=seed, threads=threads))]
     drives = tasks.make(task, dict(settings)).open_loops()
     if drives:
@@ -156,7 +160,7 @@ def runs(path: "str | Path") -> list[Path]:
 
 
 def pooled(scores: Sequence[Score]) -> list[Score]:
-    """Scores of several runs as one: per ground and kind of actor, all episodes."""
+    """Pool the scores of several runs: one per ground and kind of actor, over all episodes."""
     found: dict[tuple[str, str], Score] = {}
     for one in scores:
         key = one.ground, one.actor

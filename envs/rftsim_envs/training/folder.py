@@ -31,13 +31,13 @@ PACKAGES: Final = ("rftsim", "mujoco", "stable-baselines3", "torch", "numpy")
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Plan:
-    """What is asked of a training run, resolved.
+    """A training run as it is asked for, every default resolved.
 
     Attributes:
-        task: One of `rftsim_envs.TASKS`.
+        task: Name of one of `rftsim_envs.TASKS`.
         settings: Every field of the task's Config.
-        training: PPO's settings.
-        seed: Of everything that is drawn.
+        training: Settings of PPO.
+        seed: Seed of everything that is drawn.
         algo: One of `ALGORITHMS`.
     """
 
@@ -72,13 +72,13 @@ def make_plan(
     seed: int = 0,
     algo: str = "ppo",
 ) -> Plan:
-    """A plan.
+    """Make a plan from what differs from the defaults.
 
     Args:
         env: `rftsim/NAME-v0`, or NAME.
         settings: Settings of the task that differ from its own.
         changes: Settings of the training that differ from the task's.
-        seed: Of everything that is drawn.
+        seed: Seed of everything that is drawn.
         algo: One of `ALGORITHMS`.
 
     Raises:
@@ -95,15 +95,15 @@ def make_plan(
 
 
 def name_of(env: str) -> str:
-    """The task's name, of `rftsim/NAME-v0` or of itself."""
+    """Name of the task that is given as `rftsim/NAME-v0` or as NAME."""
     return env.removeprefix("rftsim/").removesuffix("-v0")
 
 
 class Folder:
-    """A run's folder.
+    """The folder of a training run, and the paths in it.
 
     Args:
-        path: The folder; nothing is made yet.
+        path: Path of the folder; nothing is made yet.
     """
 
     def __init__(self, path: "str | Path") -> None:
@@ -119,11 +119,11 @@ class Folder:
 
     @property
     def done(self) -> bool:
-        """Whether the run is finished."""
+        """Whether a run was begun here and is finished."""
         return self.exists and bool(self._read()["done"])
 
     def plan(self) -> Plan:
-        """What was asked.
+        """Read the plan of the run from config.json.
 
         Raises:
             TrainingError: No run was begun here, or its config.json cannot be read.
@@ -150,7 +150,7 @@ class Folder:
 
     @contextlib.contextmanager
     def opened(self, plan: Plan) -> Iterator[None]:
-        """The folder for this plan, for nobody else until the block ends.
+        """Keep the folder for this plan, and for nobody else, until the block ends.
 
         Raises:
             TrainingError: It belongs to another plan or to another process, or it cannot be written.
@@ -187,13 +187,13 @@ class Folder:
             warnings.warn(f"versions changed since {self.path} was begun: {', '.join(changes)}", RftsimWarning, 2)
 
     def write_config(self, plan: Plan, *, done: bool) -> None:
-        """Write config.json."""
+        """Write config.json, which says whether the run is finished."""
         text = json.dumps(plan.as_json() | {"versions": versions(), "done": done}, indent=2)
         write_whole(self.config, f"{text}\n".encode())
 
 
 def versions() -> dict[str, str]:
-    """Of what a run's numbers depend on."""
+    """Versions of the packages on which a run's numbers depend, by name."""
     return {name: importlib.metadata.version(name) for name in PACKAGES}
 
 
@@ -219,23 +219,26 @@ def write_whole(path: Path, content: bytes) -> None:
 
 
 class Progress:
-    """progress.csv: a row per update.
+    """The file progress.csv, which has a row per update.
 
     Args:
-        path: The file.
-        rows: Rows to keep of the one that is there; others came after the checkpoint.
+        path: Path of the file.
+        kept: Number of rows to keep of the file that is there; later ones came after the checkpoint.
+
+    Attributes:
+        rows: Rows of the file, texts by column.
     """
 
-    def __init__(self, path: Path, rows: int) -> None:
+    def __init__(self, path: Path, kept: int) -> None:
         self._path = path
-        self.rows = read_progress(path)[:rows] if path.is_file() else []
+        self.rows = read_progress(path)[:kept] if path.is_file() else []
         if self.rows:
             write_whole(
                 path, ("\n".join(map(_line, [self.rows[0], *(row.values() for row in self.rows)])) + "\n").encode()
             )
 
     def add(self, row: Mapping[str, Any]) -> None:
-        """Append a row.
+        """Append a row, and a head before the first one.
 
         Raises:
             TrainingError: It cannot be written.
@@ -256,6 +259,6 @@ def _line(values: Any) -> str:
 
 
 def read_progress(path: Path) -> list[dict[str, str]]:
-    """The rows of a progress.csv."""
+    """Read the rows of a progress.csv, texts by column."""
     with path.open(newline="") as file:
         return list(csv.DictReader(file))

@@ -1,4 +1,4 @@
-"""Episodes one after the other, to look at."""
+"""Episodes one after the other, to look at, to film and to picture."""
 
 import contextlib
 from collections.abc import Callable, Iterator, Mapping
@@ -17,11 +17,11 @@ from rftsim_envs.tally import Tally
 from rftsim_envs.training.actors import Maker
 
 FPS: Final = 30.0
-"""Of films."""
+"""Pictures per second of a film."""
 SIZE: Final = (960, 540)
 """Width and height of films [pixels]."""
 MOMENTS: Final = 4
-"""In a strip."""
+"""Number of pictures in a strip."""
 ARROW: Final = 0.3
 """Length of the strongest traction's arrow in a strip, over the model's extent."""
 
@@ -35,14 +35,14 @@ def play(
     seconds: float | None,
     watch: Callable[[Mapping[str, Any]], None],
 ) -> Iterator[dict[str, float]]:
-    """Play; yields what each episode came to.
+    """Play episodes, and yield what each came to.
 
     Args:
         env: The environment.
-        maker: Who chooses the actions.
-        episodes: How many.
-        seed: Episode k is seeded with seed + k.
-        seconds: Cut episodes there [s].
+        maker: Maker of the actor that chooses the actions.
+        episodes: Number of episodes.
+        seed: Seed of the first episode; episode k is seeded with seed + k.
+        seconds: Duration after which an episode is cut [s]; None for its own.
         watch: Called with the info of each control step.
     """
     steps = env.config.steps if seconds is None else max(round(seconds / env.config.period), 1)
@@ -61,7 +61,7 @@ def play(
 
 @contextlib.contextmanager
 def taking_strip(env: SandEnv, path: Path) -> Iterator[Callable[[Mapping[str, Any]], None]]:
-    """A picture of `MOMENTS` moments of a sand environment, evenly spaced: call what is given after each control step.
+    """Take a picture of `MOMENTS` moments, evenly spaced, on sand: call what is given after each control step.
 
     Arrows are the sand's traction.
     """
@@ -86,7 +86,7 @@ def taking_strip(env: SandEnv, path: Path) -> Iterator[Callable[[Mapping[str, An
 
 @contextlib.contextmanager
 def filming(env: SandEnv, path: Path) -> Iterator[Callable[[Mapping[str, Any]], None]]:
-    """A film of the environment, which must render: call what is given after each control step.
+    """Film an environment, which must render: call what is given after each control step.
 
     Raises:
         TrainingError: It cannot be written.

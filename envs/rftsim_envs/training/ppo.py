@@ -1,4 +1,4 @@
-"""PPO on `SandVecEnv`, resumable."""
+"""Training by PPO on `SandVecEnv`, which can be stopped and goes on."""
 
 import contextlib
 import io
@@ -23,31 +23,32 @@ from rftsim_envs.sb3 import SandVecEnv
 from rftsim_envs.training.folder import Folder, Plan, Progress, write_whole
 
 EVERY_SECONDS: Final = 30.0
-"""Between checkpoints, at most; or"""
+"""Time after which an update is followed by a checkpoint [s]."""
 EVERY_STEPS: Final = 50_000
+"""Number of control steps after which an update is followed by a checkpoint."""
 EPISODES: Final = 100
-"""What is reported are means over so many last ones."""
+"""Number of last episodes over which means are reported."""
 THREADS: Final = 1
-"""Of torch: the networks are small."""
+"""Number of torch's threads, for the networks are small."""
 NEVER: Final = 1 << 62
-"""Of SB3's own log."""
+"""Number of updates between two of SB3's own logs."""
 MEMBER: Final = "rftsim.json"
-"""Of a checkpoint: what SB3 does not keep."""
+"""Name in a checkpoint's archive of what SB3 does not keep."""
 
 
 class Trained(NamedTuple):
-    """How a call of `train` ended."""
+    """State of a run when a call of `train` ended."""
 
     steps: int
-    """Control steps in all, of this call and those before it."""
+    """Number of control steps in all, of this call and those before it."""
     began: int
-    """Of them before this call."""
+    """Number of control steps before this call."""
     done: bool
     """Whether the run is finished; otherwise it was stopped."""
 
 
 Report = Callable[[Mapping[str, Any]], None]
-"""Called with each row of progress.csv."""
+"""Function that is called with each row of progress.csv."""
 
 
 def train(
@@ -66,7 +67,7 @@ def train(
     Args:
         plan: What is asked.
         path: The folder.
-        threads: Of the simulations; 0 for as many as there are processors. The result is the same.
+        threads: Number of the simulations' threads; 0 for as many as there are processors. The result is the same.
         tensorboard: Write for TensorBoard, too.
         report: Called after each update.
         stop: Asked at each control step; if true, the run is left with a checkpoint of its last update.
@@ -82,21 +83,16 @@ def train(
         env = SandVecEnv(plan.task, plan.training.n_envs, threads, **plan.settings)
         run = _Run(plan, env, folder, tensorboard)
         began = run.resume()
-        with torch_threads(THREADS):
-            for k in range(run.updates, len(updates)):
-                if not run.update(updates[k], 1.0 - k / len(updates), stop):
-                    run.save()
-                    return Trained(run.steps, began, False)
-                report(run.rows[-1])
-                run.save_sometimes()
+        done = run.carry_on(updates, report, stop)
         run.save()
-        run.write(folder.policy, folder.checkpoint.read_bytes())
-        folder.write_config(plan, done=True)
-        return Trained(run.steps, began, True)
+        if done:
+            run.write(folder.policy, folder.checkpoint.read_bytes())
+            folder.write_config(plan, done=True)
+        return Trained(run.steps, began, done)
 
 
 def make_model(training: Training, env: SandVecEnv, seed: int) -> PPO:
-    """PPO, not yet trained."""
+    """SB3's PPO with these settings, not yet trained."""
     return PPO(
         "MlpPolicy",
         env,
@@ -124,7 +120,7 @@ class _Run:
         self.model = make_model(plan.training, env, plan.seed)
         formats: list[KVWriter] = [TensorBoardOutputFormat(str(folder.tensorboard))] if tensorboard else []
         self.model.set_logger(Logger(None, formats))
-        self._rate, self._watch = plan.training.learning_rate, _Watch()
+        self._rate, self._callback = plan.training.learning_rate, _Callback()
         self._spent, self._saved = 0.0, (time.monotonic(), 0)
 
     @property
@@ -137,8 +133,8 @@ class _Run:
             kept = _read(self.folder.checkpoint)
             self.model.set_parameters(str(self.folder.checkpoint), device="cpu")
             self.updates, self.steps, self._spent = kept["updates"], kept["steps"], kept["seconds"]
-            self._watch.episodes.extend(kept["episodes"])
-            _set_random(kept["random"], self.env)
+            self._callback.episodes.extend(kept["episodes"])
+            _set_random_states(kept["random"], self.env)
         else:
             self.env.seed(self.model.seed)
         self.model.num_timesteps = self.steps
@@ -149,31 +145,41 @@ class _Run:
         self._saved = time.monotonic(), self.steps
         return self.steps
 
+    def carry_on(self, updates: list[int], report: Report, stop: Callable[[], bool]) -> bool:
+        """Do the updates that are left; False where they were stopped."""
+        with torch_threads(THREADS):
+            for k in range(self.updates, len(updates)):
+                if not self.update(updates[k], 1.0 - k / len(updates), stop):
+                    return False
+                report(self.rows[-1])
+                self.save_sometimes()
+        return True
+
     def update(self, n: int, left: float, stop: Callable[[], bool]) -> bool:
         """Collect n control steps of each simulation and learn from them; False where it was stopped."""
-        began, self._watch.stop = time.monotonic(), stop
+        began, self._callback.stop = time.monotonic(), stop
         self.model.n_steps = self.model.rollout_buffer.buffer_size = n
         self.model.lr_schedule = ConstantSchedule(left * self._rate)
-        self.model.learn(n * self.env.num_envs, self._watch, NEVER, reset_num_timesteps=False)
-        if self._watch.stopped:
+        self.model.learn(n * self.env.num_envs, self._callback, NEVER, reset_num_timesteps=False)
+        if self._callback.stopped:
             return False
         self.updates, self.steps = self.updates + 1, self.steps + n * self.env.num_envs
         took = time.monotonic() - began
         self._spent += took
-        means = self._watch.means()
+        means = self._callback.means()
         row = {
             "update": self.updates,
             "steps": self.steps,
             "seconds": round(self._spent, 3),
             "steps_per_second": round(n * self.env.num_envs / took, 1),
-            "reward": f"{self._watch.reward:.6g}",
+            "reward": f"{self._callback.reward:.6g}",
             "return": means.pop("r", ""),
             "length": means.pop("l", ""),
         }
         try:
-            self._progress.add(row | {name: means.get(name, "") for name in self._watch.names})
+            self._progress.add(row | {name: means.get(name, "") for name in self._callback.names})
         except TrainingError as error:
-            raise TrainingError(f"{error}. {self._whole()}") from error
+            raise TrainingError(f"{error}. {self._what_is_kept()}") from error
         for name, value in means.items():
             self.model.logger.record(f"episode/{name}", float(value))
         self.model.dump_logs()
@@ -192,8 +198,8 @@ class _Run:
             "updates": self.updates,
             "steps": self.steps,
             "seconds": self._spent,
-            "episodes": list(self._watch.episodes),
-            "random": _random(self.env),
+            "episodes": list(self._callback.episodes),
+            "random": _random_states(self.env),
         }
         with zipfile.ZipFile(buffer, "a") as archive:
             archive.writestr(MEMBER, json.dumps(kept))
@@ -205,16 +211,16 @@ class _Run:
         try:
             write_whole(path, content)
         except TrainingError as error:
-            raise TrainingError(f"{error}. {self._whole()}") from error
+            raise TrainingError(f"{error}. {self._what_is_kept()}") from error
 
-    def _whole(self) -> str:
+    def _what_is_kept(self) -> str:
         if not self.folder.checkpoint.is_file():
             return "Nothing was trained."
         steps = _read(self.folder.checkpoint)["steps"]
         return f"The checkpoint at {steps} steps is whole: the same command goes on there."
 
 
-class _Watch(BaseCallback):
+class _Callback(BaseCallback):
     """Sees whether to stop, and what the episodes came to."""
 
     def __init__(self) -> None:
@@ -237,13 +243,13 @@ class _Watch(BaseCallback):
         self.names = self.training_env.get_attr("measured")[0]
 
     def means(self) -> dict[str, str]:
-        """Of each number over the last episodes."""
+        """Mean of each number over the last episodes, as text."""
         if not self.episodes:
             return {}
         return {name: f"{np.mean([one[name] for one in self.episodes]):.6g}" for name in self.episodes[-1]}
 
 
-def _random(env: SandVecEnv) -> dict[str, Any]:
+def _random_states(env: SandVecEnv) -> dict[str, Any]:
     kind, keys, *rest = np.random.get_state(legacy=True)  # noqa: NPY002  (SB3 draws from it)
     return {
         "torch": torch.get_rng_state().numpy().tobytes().hex(),
@@ -252,7 +258,7 @@ def _random(env: SandVecEnv) -> dict[str, Any]:
     }
 
 
-def _set_random(kept: Mapping[str, Any], env: SandVecEnv) -> None:
+def _set_random_states(kept: Mapping[str, Any], env: SandVecEnv) -> None:
     torch.set_rng_state(torch.frombuffer(bytearray.fromhex(kept["torch"]), dtype=torch.uint8))
     np.random.set_state(tuple(kept["numpy"]))  # noqa: NPY002
     for rng, state in zip(env.rngs, kept["env"], strict=True):
@@ -270,7 +276,7 @@ def _read(checkpoint: Path) -> dict[str, Any]:
 
 @contextlib.contextmanager
 def torch_threads(count: int) -> Iterator[None]:
-    """Let torch use so many threads, for a while."""
+    """Let torch use this number of threads until the block ends."""
     before = torch.get_num_threads()
     torch.set_num_threads(count)
     try:

@@ -1,4 +1,4 @@
-"""The same call for many arguments: here one after the other, or on Ray side by side."""
+"""Jobs of one function with many arguments: here one after the other, or on Ray side by side."""
 
 import contextlib
 import os
@@ -9,7 +9,7 @@ from typing import Any, Final, TypeVar
 T = TypeVar("T")
 
 RETRIES: Final = 5
-"""How often a job is begun again whose worker died."""
+"""How often a job whose worker died is begun again."""
 LOCAL: Final = "local"
 
 
@@ -19,11 +19,11 @@ def spread(
     ray: str | None,
     report: Callable[[str, T], Any] = lambda name, result: None,
 ) -> dict[str, T]:
-    """The results by name.
+    """Call a function with the arguments of each job, and return the results by the jobs' names.
 
     Args:
-        function: Of a module, so that workers can import it; where it is interrupted it may be called again.
-        jobs: Arguments by name.
+        function: Function of a module, so that workers can import it; where it is interrupted it may be called again.
+        jobs: Arguments by the job's name.
         ray: None for one after the other in this process; `local`, or the address of a Ray cluster.
         report: Called with each result as it comes.
     """
@@ -47,10 +47,10 @@ def _on_ray(
     import ray  # an extra
 
     with contextlib.redirect_stdout(sys.stderr):  # Ray prints what happens to its workers
-        yield from _tasks(ray, function, jobs, address)
+        yield from _remotely(ray, function, jobs, address)
 
 
-def _tasks(
+def _remotely(
     ray: Any, function: Callable[..., T], jobs: Mapping[str, tuple[Any, ...]], address: str
 ) -> Iterator[Iterator[tuple[str, T]]]:
     ours = not ray.is_initialized()
