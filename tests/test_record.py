@@ -8,7 +8,8 @@ import pytest
 from scipy.spatial import cKDTree
 
 import rftsim
-from rftsim.view import record
+from rftsim.view import record, recording_file
+from rftsim.view.shapes import traction_colours
 
 rerun_chunk = pytest.importorskip("rerun.chunk")
 
@@ -95,7 +96,7 @@ def test_triangles_are_drawn_where_they_feel_the_sand_and_grey_where_they_do_not
     skin = contents[f"/world/body/{BODIES[name]}/skin"]
     triangles = np.array(skin["Mesh3D:vertex_positions"][0]).reshape(-1, 3, 3)
     colours = np.array(skin["Mesh3D:vertex_colors"], dtype=np.uint32).reshape(len(truth), -1, 3)
-    rotation, grey = np.empty(9), record.traction_colours(np.array([-1.0]), 1.0)
+    rotation, grey = np.empty(9), traction_colours(np.array([-1.0]), 1.0)
     for (*_, xpos, xquat, felt), shown in zip(truth, colours, strict=True):
         mujoco.mju_quat2Mat(rotation, xquat[model.body(name).id])
         centres = triangles.mean(axis=1) @ rotation.reshape(3, 3).T + xpos[model.body(name).id]
@@ -107,7 +108,7 @@ def test_triangles_are_drawn_where_they_feel_the_sand_and_grey_where_they_do_not
 
 
 def test_colours_darken_with_traction():
-    colours = record.traction_colours(np.array([-1.0, np.nan, 0.0, 1.0, 2.0, 3.0, 4.0, 9.0]), 4.0)
+    colours = traction_colours(np.array([-1.0, np.nan, 0.0, 1.0, 2.0, 3.0, 4.0, 9.0]), 4.0)
     channels = colours[:, None] >> np.array([24, 16, 8, 0], dtype=np.uint32) & 255
     assert colours[0] == colours[1] != colours[2]
     assert colours[-1] == colours[-2]
@@ -210,7 +211,7 @@ def test_every_geom_and_a_finer_surface(tmp_path):
     contents = read(tmp_path / "x.rrd")
     skin = contents["/world/body/ball/skin"]
     height = np.array(skin["Mesh3D:vertex_positions"][0]).reshape(-1, 3, 3)[..., 2].mean(axis=1) + 0.05
-    coloured = np.array(skin["Mesh3D:vertex_colors"][0])[::3] != record.traction_colours(np.array([-1.0]), 1.0)
+    coloured = np.array(skin["Mesh3D:vertex_colors"][0])[::3] != traction_colours(np.array([-1.0]), 1.0)
     assert coloured[height < -0.01].all()
     assert not coloured[height > 0.01].any()
     assert "/world/body/front\\ box/mark" not in contents, "it is part of the skin"
@@ -270,7 +271,7 @@ def test_a_file_that_lacks_rows_is_not_put_in_place(model, tmp_path, monkeypatch
         def stream(self):
             return (chunk for chunk in super().stream() if chunk.entity_path != "/sand/power")
 
-    monkeypatch.setattr(record, "RrdReader", Forgetful)
+    monkeypatch.setattr(recording_file, "RrdReader", Forgetful)
     recorder = record.Recorder(model, tmp_path / "x.rrd")
     recorder.log(mujoco.MjData(model))
     with pytest.raises(rftsim.RftsimError, match="/sand/power"):

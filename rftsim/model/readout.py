@@ -147,8 +147,8 @@ class Work(NamedTuple):
     steps: int
     evaluations: int
     """Evaluations of every body's force."""
-    jacobians: int
-    """Evaluations of its derivative, each worth about four of the force."""
+    derivatives: int
+    """Evaluations of the derivative of every body's force, each worth about four of the force."""
     unsolved: int
     """Equations whose solution stayed outside the tolerance; the best found was taken."""
 

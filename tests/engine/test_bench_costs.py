@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from rftsim.bench import environment, pareto
+from rftsim.bench.environment_picture import plot_environment
 from rftsim.bench.pareto import Compared, Tried
-from rftsim.view.plots import plot_environment, plot_pareto
+from rftsim.bench.pareto_picture import plot_pareto
 
 
 def tried(cost, error, h=1e-3):
@@ -17,7 +18,7 @@ def tried(cost, error, h=1e-3):
 def test_the_front_is_what_nothing_cheaper_comes_near():
     """Of four, one is dearer and no better, and one is hardly better."""
     best, good, dear, close = tried(4.0, 0.1), tried(1.0, 0.4), tried(2.0, 0.5), tried(1.1, 0.39)
-    assert pareto.fronts([dear, best, close, good]) == [good, best]
+    assert pareto.front([dear, best, close, good]) == [good, best]
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +32,7 @@ def test_a_shorter_step_is_nearer_to_the_reference(runner, tmp_path):
     error = {(one.force, one.h): one.error for one in runner.tried}
     assert 0.0 < error["implicit", 1e-3] < 0.5 * error["implicit", 5e-3] < 0.005
     assert all(math.isfinite(value) for value in error.values())
-    assert pareto.apart([Compared(runner.tried, np.array(runner.path))]) == {("runner", "drft2d"): 0.0}
+    assert pareto.laws_apart([Compared(runner.tried, np.array(runner.path))]) == {("runner", "drft2d"): 0.0}
     plot_pareto([Compared(runner.tried, np.array(runner.path))], tmp_path / "pareto.png")
     assert (tmp_path / "pareto.png").stat().st_size > 10_000
 

@@ -67,7 +67,7 @@ def test_few_evaluations_at_rest():
     """A body at rest costs about one evaluation a step."""
     model, data, _ = drop("heavy", 5e-3, seconds=10.0)
     work = rftsim.work(model, data)
-    assert work.evaluations + 4 * work.jacobians < 1.2 * work.steps
+    assert work.evaluations + 4 * work.derivatives < 1.2 * work.steps
 
 
 def test_it_is_the_default():
