@@ -1,4 +1,4 @@
-"""What sand adds to MuJoCo's step: one simulation and many side by side, with sand and without, in turn."""
+"""The cost that sand adds to MuJoCo's step: one simulation and many side by side, with sand and without, in turn."""
 
 import functools
 import math
@@ -16,41 +16,51 @@ from rftsim.law.layout import SAND_FIELDS
 from rftsim.model.readout import instances, work
 from rftsim.surface.triangles import Array
 
-Sand = Literal["none", "explicit", "implicit"]
-Works = dict[Sand, Callable[[], float]]
-SANDS: Final[tuple[Sand, ...]] = ("none", "explicit", "implicit")
+Ground = Literal["none", "explicit", "implicit"]
+"""No sand, or sand with a kind of force."""
+Timers = dict[Ground, Callable[[], float]]
+"""Functions that each time a step once [s], by ground."""
+GROUNDS: Final[tuple[Ground, ...]] = ("none", "explicit", "implicit")
+"""Every ground; the first is the one that the others are compared with."""
 CASES: Final = (("wheel", "drft2d"), ("wheel", "rft2d"), ("runner", "drft2d"), ("hexapod", "rft3d"))
-"""Subjects and laws."""
-LIMITS: Final[dict[Sand, float]] = {"none": math.inf, "explicit": 2.0, "implicit": 3.0}
-"""What the wheel's step may cost, over the one without sand; batches may lose as much."""
+"""Subjects and laws that are timed."""
+LIMITS: Final[dict[Ground, float]] = {"none": math.inf, "explicit": 2.0, "implicit": 3.0}
+"""Largest cost that the wheel's step was asked to keep, over the one without sand; batches may lose as much."""
 WINDOW: Final = 0.2
-"""Simulated in each repetition [s]."""
+"""Time that is simulated in each repetition [s]."""
 SIMULATIONS: Final = 256
+"""Simulations of a batch."""
 BATCH_STEPS: Final = 40
-"""In each repetition of a batch."""
+"""Steps in each repetition of a batch."""
 THREADS: Final = (1, 2)
+"""Numbers of threads that batches are stepped by."""
 DRAWN: Final = {"xi_n": (0.5, 2.0), "zeta": (0.5, 2.0), "mu_surf": (0.7, 1.3), "rho_c": (0.8, 1.2)}
 """Ranges of the factors that the sand's parameters are multiplied by in each simulation of a batch."""
 
 
 class Timed(NamedTuple):
-    """One subject with one kind of sand."""
+    """The cost of a step of one subject under one law, with one kind of sand or none."""
 
     subject: str
+    """The subject's name."""
     law: str
-    sand: Sand
+    """The law's name."""
+    sand: Ground
+    """No sand, or the sand's force."""
     triangles: int
+    """Triangles that feel the sand, of all bodies."""
     seconds: float
-    """Processor time of a step; the median of the repetitions."""
+    """Processor time of a step [s]; the median of the repetitions."""
     ratio: float
-    """Over the step without sand; the median of the repetitions' ratios."""
+    """Time of a step over that without sand; the median of the repetitions' ratios."""
     realtime: float
     """Simulated over processor time."""
     evaluations: float
-    """Of the force, in each step."""
+    """Evaluations of the force in each step, in the mean."""
     derivatives: float
+    """Evaluations of its derivative in each step, in the mean."""
     batch: dict[int, tuple[float, float]]
-    """By threads: steps per second of all simulations, and the share of those without sand."""
+    """Steps per second of all simulations, and their share of those without sand, by the number of threads."""
 
 
 def measure(rounds: int, report: Callable[[str], Any]) -> list[Timed]:
@@ -59,15 +69,15 @@ def measure(rounds: int, report: Callable[[str], Any]) -> list[Timed]:
 
 
 def repetitions(rounds: int) -> int:
-    """How often `measure` reports."""
+    """The number of times that `measure` reports in so many rounds."""
     return len(CASES) * rounds * (1 + len(THREADS))
 
 
-def models(name: str, law: str) -> dict[Sand, mujoco.MjModel]:
-    """A subject without sand, and with both forces."""
+def models(name: str, law: str) -> dict[Ground, mujoco.MjModel]:
+    """Compile a subject without sand, and with both forces under a law."""
     subject = SUBJECTS[name]
-    bare: dict[Sand, mujoco.MjModel] = {"none": subject.bare().compile()}
-    return bare | {force: subject.staged(law, force=force).model for force in SANDS if force != "none"}
+    bare: dict[Ground, mujoco.MjModel] = {"none": subject.bare().compile()}
+    return bare | {force: subject.stage(law, force=force).model for force in GROUNDS if force != "none"}
 
 
 def randomised(model: mujoco.MjModel, batch: Batch, seed: int) -> None:
@@ -81,44 +91,49 @@ def randomised(model: mujoco.MjModel, batch: Batch, seed: int) -> None:
 
 
 def _case(name: str, law: str, rounds: int, report: Callable[[str], Any]) -> list[Timed]:
+    """Time a subject under a law on every ground, one simulation at a time and in batches."""
     moving, found = in_motion(name, law), models(name, law)
-    singles = {sand: mujoco.MjData(model) for sand, model in found.items()}
+    singles = {ground: mujoco.MjData(model) for ground, model in found.items()}
     steps = round(WINDOW / moving.model.opt.timestep)
-    taken: Works = {sand: functools.partial(_single, data, moving, steps) for sand, data in singles.items()}
-    times = _in_turn(taken, rounds, lambda: report(f"{name}, {law}"))
-    batches: dict[int, dict[Sand, list[float]]] = {}
+    timers: Timers = {ground: functools.partial(_single, data, moving, steps) for ground, data in singles.items()}
+    times = _in_turn(timers, rounds, lambda: report(f"{name}, {law}"))
+    batches = {}
     for threads in THREADS:
-        works: Works = {sand: _many(model, moving, threads) for sand, model in found.items()}
-        batches[threads] = _in_turn(works, rounds, lambda: report(f"{name}, {law}, {SIMULATIONS} at once"))
+        timers = {ground: _many(model, moving, threads) for ground, model in found.items()}
+        batches[threads] = _in_turn(timers, rounds, lambda: report(f"{name}, {law}, {SIMULATIONS} at once"))
     rows = []
-    for sand, model in found.items():
-        spent = work(model, singles[sand]) if sand != "none" else None
-        seconds, total = statistics.median(times[sand]), max(spent.steps if spent else 0, 1)
-        shares = {
-            threads: (1.0 / statistics.median(own[sand]), 1.0 / _ratio(own, sand)) for threads, own in batches.items()
-        }
+    for ground, model in found.items():
+        seconds = statistics.median(times[ground])
+        shares = {n: (1.0 / statistics.median(own[ground]), 1.0 / _ratio(own, ground)) for n, own in batches.items()}
         triangles = sum(int(surface[14]) for bed in instances(model) for surface in bed.bodies.values())
-        evaluations, derivatives = (spent.evaluations / total, spent.jacobians / total) if spent else (0.0, 0.0)
-        realtime = model.opt.timestep / seconds
-        ratio = _ratio(times, sand)
-        rows.append(Timed(name, law, sand, triangles, seconds, ratio, realtime, evaluations, derivatives, shares))
+        costs = seconds, _ratio(times, ground), model.opt.timestep / seconds
+        rows.append(Timed(name, law, ground, triangles, *costs, *_work_per_step(singles[ground]), shares))
     return rows
 
 
-def _in_turn(works: dict[Sand, Callable[[], float]], rounds: int, report: Callable[[], Any]) -> dict[Sand, list[float]]:
-    """Each work's time in every round; all in turn, so that a busy machine slows all."""
-    for once in works.values():
+def _work_per_step(data: mujoco.MjData) -> tuple[float, float]:
+    """Evaluations of the force and of its derivative in each step, in the mean; none without sand."""
+    if not instances(data.model):
+        return 0.0, 0.0
+    spent = work(data.model, data)
+    return spent.evaluations / max(spent.steps, 1), spent.derivatives / max(spent.steps, 1)
+
+
+def _in_turn(timers: Timers, rounds: int, report: Callable[[], Any]) -> dict[Ground, list[float]]:
+    """Each timer's times in every round; all in turn, so that a busy machine slows all."""
+    for once in timers.values():
         once()
-    times: dict[Sand, list[float]] = {sand: [] for sand in works}
+    times: dict[Ground, list[float]] = {ground: [] for ground in timers}
     for _ in range(rounds):
-        for sand, once in works.items():
-            times[sand].append(once())
+        for ground, once in timers.items():
+            times[ground].append(once())
         report()
     return times
 
 
-def _ratio(times: dict[Sand, list[float]], sand: Sand) -> float:
-    return statistics.median(own / bare for own, bare in zip(times[sand], times["none"], strict=True))
+def _ratio(times: dict[Ground, list[float]], ground: Ground) -> float:
+    """Median over the rounds of a ground's time over that without sand."""
+    return statistics.median(own / bare for own, bare in zip(times[ground], times["none"], strict=True))
 
 
 def _single(data: mujoco.MjData, moving: mujoco.MjData, steps: int) -> float:
@@ -131,7 +146,7 @@ def _single(data: mujoco.MjData, moving: mujoco.MjData, steps: int) -> float:
 
 
 def _many(model: mujoco.MjModel, moving: mujoco.MjData, threads: int) -> Callable[[], float]:
-    """What times a step of one simulation in a batch [s]: elapsed time over the steps of all."""
+    """Make a timer of a step of one simulation in a batch [s]: elapsed time over the steps of all."""
     batch = Batch(model, SIMULATIONS, threads)
     if model.nnumeric:
         randomised(model, batch, seed=0)

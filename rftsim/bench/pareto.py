@@ -1,4 +1,4 @@
-"""What speed costs in accuracy: laws, triangles and time steps, against the finest mesh at a small step.
+"""The accuracy that speed costs: laws, triangles and time steps, against the finest mesh at a small step.
 
 Each law is held against itself: its own wrench and trajectory with every triangle of a fine mesh, at a step of 0.1 ms.
 How far the laws are from one another is told beside that.
@@ -6,6 +6,7 @@ How far the laws are from one another is told beside that.
 
 import math
 import statistics
+import sys
 import time
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -15,9 +16,9 @@ import mujoco
 import numpy as np
 
 from rftsim.bench import subjects
+from rftsim.bench.memory import remember
 from rftsim.bench.subjects import SUBJECTS, Subject
-from rftsim.files import Kept
-from rftsim.machine.sources import SOURCE
+from rftsim.bench.trials import Force
 from rftsim.model.reach import sampled_reach
 from rftsim.model.readout import instances
 from rftsim.reduction import reduce
@@ -25,53 +26,57 @@ from rftsim.run.scenes import Staged
 from rftsim.surface.triangles import Array
 
 STEPS: Final = (5e-4, 1e-3, 2e-3, 5e-3, 1e-2)
-"""[s]."""
+"""Time steps that are tried [s]."""
 REFERENCE_STEP: Final = 1e-4
-"""[s]."""
+"""Time step of the reference's path [s]."""
 SAMPLE: Final = 1e-2
-"""Between two positions that are compared [s]."""
+"""Time between two positions that are compared [s]."""
 REPEATS: Final = 3
-"""Of all runs in turn; the median of a run's times counts."""
+"""Repetitions of all runs in turn; the median of a run's times counts."""
 LESS: Final = 0.7
-"""What counts as better has at most this share of the error."""
+"""Largest share of another's error that counts as better."""
 SEED: Final = 7
-"""Of the poses and motions at which wrenches are compared; economies were sought at others."""
+"""Seed of the poses and motions at which wrenches are compared; economies were sought at others."""
 Mesh = Literal["fine", "shipped", "1 %", "3 %", "10 %"]
 MESHES: Final[tuple[Mesh, ...]] = ("fine", "shipped", "1 %", "3 %", "10 %")
 """Every triangle of the fine mesh; the model's own; the fewest facets found of the fine mesh within a tolerance."""
-Force = Literal["implicit", "explicit"]
 
 
 class Tried(NamedTuple):
-    """One way to step a subject."""
+    """One way to step a subject: a law, a mesh, a force and a time step, with their error and cost."""
 
     subject: str
+    """The subject's name."""
     law: str
+    """The law's name."""
     mesh: Mesh
+    """The mesh that feels the sand."""
     elements: int
     """Triangles or facets, of all bodies."""
     wrench_error: float
-    """Largest over poses and motions, see `reduce.errors`."""
+    """Largest error of a body's wrench over poses and motions, see `reduce.errors`."""
     force: Force
+    """The sand's force."""
     h: float
     """Time step [s]."""
     error: float
     """Largest distance from the reference's path, over that path's length; infinite where the simulation was lost."""
     seconds: float
-    """Processor time of a step."""
+    """Processor time of a step [s]."""
 
     @property
     def cost(self) -> float:
-        """Processor time over simulated time."""
+        """Processor time of a step over the time that it simulates."""
         return self.seconds / self.h
 
 
 class Compared(NamedTuple):
-    """Everything of one subject under one law."""
+    """Everything that was tried of one subject under one law."""
 
     tried: list[Tried]
+    """Every mesh, force and time step."""
     path: Array
-    """The reference's positions [m], (n, 3)."""
+    """Positions of the reference [m], shape (n, 3)."""
 
 
 class Study:
@@ -83,12 +88,11 @@ class Study:
     """
 
     def __init__(self, path: Path, quick: bool) -> None:
-        own = b"".join(Path(str(module.__file__)).read_bytes() for module in (subjects, reduce))
-        self.kept = Kept(path, SOURCE + own + Path(__file__).read_bytes() + mujoco.__version__.encode())
+        self.kept = remember(path, subjects, reduce, sys.modules[__name__])
         self.quick = quick
 
     def laws(self, name: str) -> tuple[str, ...]:
-        """Those of a subject."""
+        """The laws that a subject is tried under."""
         return SUBJECTS[name].laws[: 1 if self.quick else None]
 
     def compared(self, name: str, law: str) -> Compared:
@@ -110,18 +114,18 @@ def run(study: Study, names: Iterable[str], report: Callable[[str], Any]) -> lis
     return found
 
 
-def fronts(tried: Iterable[Tried]) -> list[Tried]:
-    """Those that nothing cheaper comes near, see LESS; the cheapest first."""
-    best, front = math.inf, []
+def front(tried: Iterable[Tried]) -> list[Tried]:
+    """Choose those that nothing cheaper comes near, see LESS; the cheapest first."""
+    least, found = math.inf, []
     for one in sorted(tried, key=lambda one: (one.cost, one.error)):
-        if one.error < LESS * best:
-            best = one.error
-            front.append(one)
-    return front
+        if one.error < LESS * least:
+            least = one.error
+            found.append(one)
+    return found
 
 
-def apart(compared: list[Compared]) -> dict[tuple[str, str], float]:
-    """How far each law's path is from that of the subject's own law, over that one's length."""
+def laws_apart(compared: list[Compared]) -> dict[tuple[str, str], float]:
+    """Distance of each law's path from that of the subject's own law, over that one's length, by subject and law."""
     own: dict[str, Array] = {}
     found = {}
     for each in compared:
@@ -132,18 +136,19 @@ def apart(compared: list[Compared]) -> dict[tuple[str, str], float]:
 
 
 def _compare(name: str, law: str, meshes: Iterable[Mesh], steps: Iterable[float]) -> tuple[list[Tried], Any]:
+    """Try meshes and time steps of a subject under a law; returns them, and the reference's path as JSON has it."""
     subject = SUBJECTS[name]
     fine = _staged(subject, law, "fine", "implicit")
     path, _ = _path(subject, fine, REFERENCE_STEP)
     kinds: list[tuple[Mesh, Force]] = [(mesh, "implicit") for mesh in meshes]
-    scenes = {(mesh, force): _staged(subject, law, mesh, force) for mesh, force in [*kinds, ("shipped", "explicit")]}
+    ways = {(mesh, force): _staged(subject, law, mesh, force) for mesh, force in [*kinds, ("shipped", "explicit")]}
     paths: dict[tuple[Mesh, Force, float], list[tuple[Array, float]]] = {}
     for _ in range(REPEATS):
-        for (mesh, force), staged in scenes.items():
+        for (mesh, force), staged in ways.items():
             for h in steps:
                 paths.setdefault((mesh, force, h), []).append(_path(subject, staged, h))
     tried = []
-    for (mesh, force), staged in scenes.items():
+    for (mesh, force), staged in ways.items():
         elements = sum(surface.ntri for surface in staged.bed.surfaces.values())
         wrong = _wrench_error(fine, staged)
         for h in steps:
@@ -155,14 +160,14 @@ def _compare(name: str, law: str, meshes: Iterable[Mesh], steps: Iterable[float]
 
 def _staged(subject: Subject, law: str, mesh: Mesh, force: Force) -> Staged:
     if mesh == "shipped":
-        return subject.staged(law, force=force)
+        return subject.stage(law, force=force)
     if mesh == "fine":
-        return subject.staged(law, force=force, max_edge=subject.fine)
-    return subject.staged(law, force=force, max_edge=subject.fine, tolerance=float(mesh.removesuffix(" %")) / 100)
+        return subject.stage(law, force=force, max_edge=subject.fine)
+    return subject.stage(law, force=force, max_edge=subject.fine, tolerance=float(mesh.removesuffix(" %")) / 100)
 
 
 def _path(subject: Subject, staged: Staged, h: float) -> tuple[Array, float]:
-    """Positions of the measured body from the start on, (n, 3), no numbers once it is lost; and the time of a step."""
+    """Positions of the measured body [m], (n, 3), nan once it is lost; and the processor time of a step [s]."""
     model = staged.model
     model.opt.timestep = h
     data, body = subject.start(model), model.body(staged.measured.body).id

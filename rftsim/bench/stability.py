@@ -2,6 +2,7 @@
 
 import math
 import statistics
+import sys
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -9,64 +10,76 @@ from typing import Any, Final, NamedTuple
 import mujoco
 import numpy as np
 
-from rftsim.bench import hard_cases
-from rftsim.bench.hard_cases import CASES, Force
-from rftsim.files import Kept
-from rftsim.machine.sources import SOURCE
+from rftsim.bench import buried_cases, free_cases, hard_cases, joined_cases, trials, wheel_cases
+from rftsim.bench.hard_cases import CASES
+from rftsim.bench.memory import remember
+from rftsim.bench.trials import Force
 from rftsim.model.readout import work
 
 STEPS: Final = (1e-4, 1e-3, 2e-3, 5e-3, 1e-2)
-"""[s]."""
+"""Time steps that every case is played at [s]."""
 CONVERGED: Final = 2e-5
 """Time step of the converged answers, with the implicit force [s]."""
 FORCES: Final[tuple[Force, ...]] = ("implicit", "explicit")
 STARTS_STEP: Final = 5e-3
 """Time step of the random starts [s]."""
+LOST: Final = 10.0
+"""Relative error from which on a simulation counts as lost in pictures."""
+PLAYED_WITH: Final = (trials, free_cases, wheel_cases, buried_cases, joined_cases, hard_cases, sys.modules[__name__])
+"""The modules that the study plays cases with."""
 
 
 class Played(NamedTuple):
-    """A hard case at one time step under one force."""
+    """A hard case played at one time step under one force."""
 
     case: str
+    """The case's name."""
     force: Force
+    """The sand's force."""
     h: float
-    """[s]."""
+    """Time step [s]."""
     measured: dict[str, float]
+    """The measured quantities by name, in the case's units."""
     failed: bool
     """Whether MuJoCo reset it, or anything measured is not finite."""
     cost: float
     """Elapsed over simulated time."""
     evaluations: float
-    """Of the force, in the mean over the steps."""
-    jacobians: float
-    """Of its derivative, in the mean over the steps."""
+    """Evaluations of the force per step, in the mean."""
+    derivatives: float
+    """Evaluations of its derivative per step, in the mean."""
     unsolved: int
+    """Equations of the implicit force that were not solved to their tolerance."""
 
 
 class Verdict(NamedTuple):
-    """How a played case compares."""
+    """A played case against what is exact, converged, or ought to be zero."""
 
     error: float
     """Largest relative error of what has an exact or converged value; nan where nothing of that kind is measured."""
     rest: float
-    """Largest of what ought to be zero, over its limit; nan where nothing of that kind is measured."""
+    """Largest ratio of what ought to be zero to its limit; nan where nothing of that kind is measured."""
 
 
 class Starts(NamedTuple):
-    """Many random starts of a free runner."""
+    """Many random starts of a free body on legs."""
 
     starts: int
+    """Number of starts."""
     failed: int
     """Simulations that MuJoCo reset, or would have."""
     gain: float
-    """Largest work of the sand on the runner in one step [J]; negative or zero where it never adds energy."""
+    """Largest work of the sand in one step [J]; negative or zero where it never adds energy."""
     evaluations: float
-    jacobians: float
+    """Evaluations of the force per step, in the mean."""
+    derivatives: float
+    """Evaluations of its derivative per step, in the mean."""
     unsolved: int
+    """Equations of the implicit force that were not solved to their tolerance."""
 
 
 def play(case: str, h: float, force: Force, *, resting: float | None = None) -> Played:
-    """Play a hard case."""
+    """Play a hard case by its name at a time step [s]; `resting` shortens the time that bodies are left alone [s]."""
     trial = CASES[case].build(h, force)
     if resting is not None:
         trial.resting = resting
@@ -76,7 +89,7 @@ def play(case: str, h: float, force: Force, *, resting: float | None = None) -> 
     failed = trial.failed or not all(math.isfinite(value) for value in measured.values())
     cost = trial.seconds / (trial.steps * h)
     return Played(
-        case, force, h, measured, failed, cost, spent.evaluations / steps, spent.jacobians / steps, spent.unsolved
+        case, force, h, measured, failed, cost, spent.evaluations / steps, spent.derivatives / steps, spent.unsolved
     )
 
 
@@ -103,7 +116,7 @@ def judge(played: Played, expected: Mapping[str, float]) -> Verdict:
 
 
 def random_starts(count: int, report: Callable[[], Any] = lambda: None) -> Starts:
-    """Throw a free runner into the sand in `count` random poses and let it move for a second each."""
+    """Throw a body on legs into the sand in `count` random poses and let it move for a second each."""
     trial = hard_cases.legs(STARTS_STEP, "implicit")
     model, data = trial.model, trial.data
     failed, gain, totals = 0, -math.inf, np.zeros(4)
@@ -119,8 +132,8 @@ def random_starts(count: int, report: Callable[[], Any] = lambda: None) -> Start
         failed += trial.failed or not np.isfinite(data.qpos).all()
         totals += work(model, data)
         report()
-    steps, evaluations, jacobians, unsolved = totals
-    return Starts(count, failed, gain, evaluations / steps, jacobians / steps, int(unsolved))
+    steps, evaluations, derivatives, unsolved = totals
+    return Starts(count, failed, gain, evaluations / steps, derivatives / steps, int(unsolved))
 
 
 class Study:
@@ -131,30 +144,34 @@ class Study:
     """
 
     def __init__(self, path: Path) -> None:
-        cases = Path(hard_cases.__file__).read_bytes() + Path(__file__).read_bytes()
-        self.kept = Kept(path, SOURCE + cases + mujoco.__version__.encode())
+        self.kept = remember(path, *PLAYED_WITH)
 
     def played(self, case: str, h: float, force: Force) -> Played:
-        """A case, played now or before."""
+        """A case at a time step [s] under a force, played now or before."""
         return Played(*self.kept.get(f"{case}/{force}/{h:g}", lambda: play(case, h, force)))
 
     def expected(self, case: str) -> dict[str, float]:
-        """The exact or converged values of a case."""
+        """The exact or converged values of a case, by quantity."""
         return dict(self.kept.get(f"{case}/expected", lambda: references(case)))
 
     def starts(self, count: int, report: Callable[[], Any]) -> Starts:
-        """The random starts."""
+        """The random starts, thrown now or before."""
         return Starts(*self.kept.get(f"starts/{count}", lambda: random_starts(count, report)))
 
 
 class Row(NamedTuple):
-    """A case in the study's table."""
+    """A case of the study, played at every time step under both forces."""
 
     case: str
+    """The case's name."""
     says: str
+    """A line that says what happens in it."""
     expected: dict[str, float]
+    """Its exact or converged values, by quantity."""
     played: dict[tuple[Force, float], Played]
+    """The measurements, by force and time step [s]."""
     verdicts: dict[tuple[Force, float], Verdict]
+    """How that compares, by force and time step [s]."""
 
 
 def run(study: Study, cases: Iterable[str], steps: Iterable[float], report: Callable[[str], Any]) -> list[Row]:
@@ -178,14 +195,15 @@ class Summary(NamedTuple):
 
     evaluations: dict[float, float]
     """Mean evaluations per step of the implicit force, by time step [s]."""
-    jacobians: dict[float, float]
+    derivatives: dict[float, float]
+    """Mean evaluations of its derivative per step, by time step [s]."""
     error: dict[Force, dict[float, float]]
     """Median error by force and time step [s], of the cases that have an exact or converged answer."""
     cost_ratio: float
     """Median cost of a second simulated at 5 ms with the implicit force, over one at 1 ms with the explicit one; nan
     where these steps were not taken."""
     nearer: tuple[int, int]
-    """Of how many of these cases the former is nearer to the truth, and how many there are."""
+    """The number of these cases in which the former is nearer to the truth, and the number of all."""
 
 
 def with_answer(rows: list[Row]) -> list[Row]:
@@ -194,7 +212,7 @@ def with_answer(rows: list[Row]) -> list[Row]:
 
 
 def summarise(rows: list[Row]) -> Summary:
-    """Means and medians over the cases."""
+    """Take the means and medians of a study over its cases."""
     steps, answered = sorted({h for row in rows for _, h in row.played}), with_answer(rows)
     error: dict[Force, dict[float, float]] = {
         force: {h: statistics.median(row.verdicts[force, h].error for row in answered) for h in steps}
@@ -207,7 +225,7 @@ def summarise(rows: list[Row]) -> Summary:
         nearer = sum(row.verdicts["implicit", 5e-3].error <= row.verdicts["explicit", 1e-3].error for row in answered)
     return Summary(
         {h: statistics.fmean(row.played["implicit", h].evaluations for row in rows) for h in steps},
-        {h: statistics.fmean(row.played["implicit", h].jacobians for row in rows) for h in steps},
+        {h: statistics.fmean(row.played["implicit", h].derivatives for row in rows) for h in steps},
         error,
         ratio,
         (nearer, len(answered)),

@@ -1,4 +1,4 @@
-"""What the studies of cost step: the shipped wheel, runner and sphere, and a hexapod, all on loose poppy seeds."""
+"""Subjects that the studies of cost step: the shipped wheel, runner and sphere, and a hexapod, on loose poppy seeds."""
 
 import dataclasses
 import functools
@@ -17,33 +17,33 @@ from rftsim.run.scenes import POPPY, SCENES, Measured, Staged, stage
 GAIT: Final = 10.0
 """Rate of the hexapod's legs [rad/s]."""
 SETTLING: Final = 1.0
-"""After this time a subject moves as it goes on to [s]."""
+"""Time after which a subject moves as it goes on to [s]."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Subject:
-    """A scene that is stepped.
+    """A robot or a body on sand, or without it, whose steps are timed and whose path is compared.
 
     Attributes:
-        says: What it is.
-        laws: That apply to it; the first is its own.
-        staged: Makes it with sand, from a law and the options of `stage`.
-        bare: Makes it without.
-        begin: Sets its start.
+        says: A line that says what it is.
+        laws: The laws that apply to it; the first is its own.
+        stage: Makes it with sand, from a law and the options of `rftsim.run.scenes.stage`.
+        bare: Makes it without sand.
+        begin: Sets its data to its start.
         fine: Longest edge of its finest mesh [m].
-        duration: How long its trajectory is compared for [s].
+        duration: Time that its path is compared for [s].
     """
 
     says: str
     laws: tuple[str, ...]
-    staged: Callable[..., Staged]
+    stage: Callable[..., Staged]
     bare: Callable[[], mujoco.MjSpec]
     begin: Callable[[mujoco.MjModel, mujoco.MjData], None]
     fine: float
     duration: float
 
     def start(self, model: mujoco.MjModel) -> mujoco.MjData:
-        """Data at the start."""
+        """Make data of a model of this subject, at its start."""
         data = mujoco.MjData(model)
         self.begin(model, data)
         mujoco.mj_forward(model, data)
@@ -53,11 +53,11 @@ class Subject:
 def _shipped(name: str, laws: tuple[str, ...], fine: float, duration: float, **settings: str) -> Subject:
     scene = SCENES[name]
 
-    def staged(law: str, **options: Any) -> Staged:
+    def make(law: str, **options: Any) -> Staged:
         return stage(name, law=law, settings=settings, draw=False, **options)
 
     return Subject(
-        scene.says, laws, staged, lambda: scene.build({**scene.settings, **settings}), _from_key, fine, duration
+        scene.says, laws, make, lambda: scene.build({**scene.settings, **settings}), _from_key, fine, duration
     )
 
 
@@ -87,6 +87,7 @@ def _on_a_tripod(model: mujoco.MjModel, data: mujoco.MjData) -> None:
 
 
 _EVERY: Final = ("drft2d", "rft2d", "drft3d", "rft3d")
+"""Every law, of which the first is the own one of a wheel."""
 SUBJECTS: Final[Mapping[str, Subject]] = {
     "wheel": _shipped("grouser-wheel", _EVERY, 0.06, 1.0),
     "runner": _shipped("four-flap-runner", ("drft2d", "drft3d"), 0.25, 0.5),
@@ -106,9 +107,9 @@ SUBJECTS: Final[Mapping[str, Subject]] = {
 
 @functools.cache
 def in_motion(name: str, law: str) -> mujoco.MjData:
-    """Data of a subject after SETTLING, with the implicit force."""
+    """Make data of a subject under a law after SETTLING, with the implicit force."""
     subject = SUBJECTS[name]
-    model = subject.staged(law).model
+    model = subject.stage(law).model
     data = subject.start(model)
     mujoco.mj_step(model, data, nstep=round(SETTLING / model.opt.timestep))
     return data

@@ -1,3 +1,3 @@
-"""The command line."""
+"""The command line `rftsim`: a module for each command."""
 
 from rftsim.cli.main import main

@@ -7,18 +7,18 @@ from typing import Literal
 
 import tyro
 
-from rftsim.cli import costs
-from rftsim.cli.stability import stability
+from rftsim.cli.costs import compare_speeds, time_environment, time_kernel
+from rftsim.cli.stability import play_hard_cases
 
 
 @dataclasses.dataclass(frozen=True)
 class Bench:
-    """Measure rftsim itself.
+    """Measure rftsim itself: its stability, its cost, and the accuracy that speed costs.
 
     stability: the hard cases (rest, light legs, stiff servos, impacts, edges, constraints) at time steps from 0.1 to
     10 ms with the implicit and the explicit force, against the exact or converged answer.
 
-    environment: what sand adds to MuJoCo's step, in one simulation and in 256 side by side.
+    environment: the time that sand adds to MuJoCo's step, in one simulation and in 256 side by side.
 
     pareto: laws, triangles and time steps: what each costs, and how far it is from the finest.
 
@@ -29,11 +29,11 @@ class Bench:
     """
 
     study: tyro.conf.Positional[Literal["stability", "kernel", "environment", "pareto"]]
-    """What is measured."""
+    """The study to run: what is measured, see above."""
     cases: tuple[str, ...] = ()
-    """Names of cases; by default all."""
+    """Names of the hard cases that stability plays; by default all."""
     starts: int = 1000
-    """Random starts of a free runner."""
+    """Random starts of a free body on legs, of stability."""
     quick: bool = False
     """Steps of 1 and 5 ms, 20 random starts; bodies of up to 20,480 triangles; fewer repetitions; one law each."""
     oracle: Path = Path("tests/oracle.py")
@@ -41,17 +41,17 @@ class Bench:
     plot: Path | None = None
     """Folder for the study's picture, NAME.png."""
     memory: Path = Path("out/bench")
-    """Folder for what stability and pareto measured: if stopped, they go on from there."""
+    """Folder for what stability and pareto measured: stopped, they go on from there."""
     json: bool = False
     """Print JSON instead of the tables."""
 
     def __call__(self, warnings: Callable[[], list[str]]) -> None:
-        """Measure, print and draw."""
+        """Measure what was asked for, print it and draw it."""
         if self.study == "kernel":
-            costs.kernel(self.quick, self.oracle, self.plot, self.json)
+            time_kernel(self.quick, self.oracle, self.plot, self.json)
         elif self.study == "environment":
-            costs.environment(self.quick, self.plot, self.json)
+            time_environment(self.quick, self.plot, self.json)
         elif self.study == "pareto":
-            costs.pareto(self.quick, self.memory, self.plot, self.json)
+            compare_speeds(self.quick, self.memory, self.plot, self.json)
         else:
-            stability(self.cases, self.starts, self.quick, self.memory, self.plot, self.json)
+            play_hard_cases(self.cases, self.starts, self.quick, self.memory, self.plot, self.json)

@@ -5,34 +5,33 @@ import math
 from pathlib import Path
 
 from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
 
-from rftsim.bench import environment as sanded
-from rftsim.bench import kernel as loop
-from rftsim.bench import pareto as tradeoff
+from rftsim.bench import environment, kernel, pareto
 from rftsim.bench.environment import Timed
+from rftsim.bench.environment_picture import plot_environment
+from rftsim.bench.kernel_picture import plot_kernel
 from rftsim.bench.pareto import Compared, Tried
+from rftsim.bench.pareto_picture import plot_pareto
 from rftsim.bench.subjects import SUBJECTS
-from rftsim.cli.output import print_json
-from rftsim.cli.studies import draw, picture_in, progress, remembered_in, say
-from rftsim.view.plots import plot_environment, plot_kernel, plot_pareto
+from rftsim.cli.output import make_table, print_json, print_line, print_written, progress
+from rftsim.cli.results import draw, picture_in, remembered_in
 
 ROUNDS = 15
 """Repetitions of each measurement."""
 
 
-def kernel(quick: bool, oracle: Path, plot: Path | None, json: bool) -> None:
-    """Time a triangle by the size of the body."""
+def time_kernel(quick: bool, oracle: Path, plot: Path | None, json: bool) -> None:
+    """Time a triangle by the size of the body: `rftsim bench kernel`."""
     picture = picture_in(plot, "kernel")
-    sizes = tuple(size for size in loop.SIZES if not quick or size <= 20480)
-    with progress("kernel", loop.ROUNDS + 2, json) as report:
-        limit = loop.arithmetic()
+    sizes = tuple(size for size in kernel.SIZES if not quick or size <= 20480)
+    with progress("kernel", kernel.ROUNDS + 2, json) as report:
+        limit = kernel.arithmetic()
         report("kernel")
-        single = loop.single_precision()
+        single = kernel.single_precision()
         report("kernel")
-        found = loop.measure(sizes, loop.load_oracle(oracle), lambda _: report("kernel"))
-    power = loop.exponent(found)
+        found = kernel.measure(sizes, kernel.load_oracle(oracle), lambda _: report("kernel"))
+    power = kernel.exponent(found)
     draw(picture, plot_kernel, found, limit)
     if json:
         rows = [
@@ -45,28 +44,28 @@ def kernel(quick: bool, oracle: Path, plot: Path | None, json: bool) -> None:
             }
             for cost in found
         ]
-        head = {"law": loop.LAW, "sizes": rows, "exponent": power}
+        head = {"law": kernel.LAW, "sizes": rows, "exponent": power}
         print_json({**head, "arithmetic": limit._asdict(), "single_precision": single._asdict()})
         return
     console = Console()
     console.print(_kernel_table(found, limit))
     for line in (
-        f"time grows with the {power:.3f}th power of the triangles from {loop.LINEAR} on; the law's "
+        f"time grows with the {power:.3f}th power of the triangles from {kernel.LINEAR} on; the law's "
         f"{limit.operations:.0f} operations take {limit.nanoseconds:.2f} ns at least, and are spared the "
         f"{100 - 100 * found[-1].leading:.0f} % of the triangles that do not lead",
         f"in single precision the loop takes {single.single_nanoseconds:.2f} ns for each of {single.triangles} "
         f"triangles instead of {single.double_nanoseconds:.2f}, and its wrench errs by {single.error:.1g}",
     ):
-        console.print(line, highlight=False, soft_wrap=True)
-    say(console, picture)
+        print_line(console, line)
+    print_written(console, picture)
 
 
-def environment(quick: bool, plot: Path | None, json: bool) -> None:
-    """Time MuJoCo's step with sand and without."""
+def time_environment(quick: bool, plot: Path | None, json: bool) -> None:
+    """Time MuJoCo's step with sand and without: `rftsim bench environment`."""
     picture = picture_in(plot, "environment")
     rounds = 3 if quick else ROUNDS
-    with progress("environment", sanded.repetitions(rounds), json) as report:
-        rows = sanded.measure(rounds, report)
+    with progress("environment", environment.repetitions(rounds), json) as report:
+        rows = environment.measure(rounds, report)
     draw(picture, plot_environment, rows)
     if json:
         print_json([row._asdict() for row in rows])
@@ -74,22 +73,21 @@ def environment(quick: bool, plot: Path | None, json: bool) -> None:
     console = Console()
     console.print(_single_table(rows))
     console.print(_batch_table(rows))
-    console.print(
+    print_line(
+        console,
         f"µs: processor time of a step; x: over that without sand, throughput likewise; real: times real time; work: "
         f"evaluations and derivatives of the force in a step. Medians of {rounds} repetitions, in turn",
-        highlight=False,
-        soft_wrap=True,
     )
-    say(console, picture)
+    print_written(console, picture)
 
 
-def pareto(quick: bool, memory: Path, plot: Path | None, json: bool) -> None:
-    """Compare laws, triangles and time steps."""
+def compare_speeds(quick: bool, memory: Path, plot: Path | None, json: bool) -> None:
+    """Compare laws, triangles and time steps: `rftsim bench pareto`."""
     picture = picture_in(plot, "pareto")
-    study = tradeoff.Study(remembered_in(memory, "pareto"), quick)
+    study = pareto.Study(remembered_in(memory, "pareto"), quick)
     with progress("pareto", sum(len(study.laws(name)) for name in SUBJECTS), json) as report:
-        compared = tradeoff.run(study, SUBJECTS, report)
-    apart = tradeoff.apart(compared)
+        compared = pareto.run(study, SUBJECTS, report)
+    apart = pareto.laws_apart(compared)
     draw(picture, plot_pareto, compared)
     if json:
         print_json(
@@ -103,28 +101,26 @@ def pareto(quick: bool, memory: Path, plot: Path | None, json: bool) -> None:
     console = Console()
     console.print(_meshes_table(compared))
     console.print(_front_table(_front(compared)))
-    console.print(
+    print_line(
+        console,
         "ms: time step; error: largest distance from the path of the same law with all triangles of the fine mesh at "
-        f"{1e3 * tradeoff.REFERENCE_STEP:g} ms, over that path's length; µs: processor time of a step; "
+        f"{1e3 * pareto.REFERENCE_STEP:g} ms, over that path's length; µs: processor time of a step; "
         "real: times real time",
-        highlight=False,
-        soft_wrap=True,
     )
     for (name, law), value in apart.items():
         if value > 0.0:
             says = f"{name}: the path under {law} lies {_percent(value)} % from that under {SUBJECTS[name].laws[0]}"
-            console.print(says, highlight=False, soft_wrap=True)
-    say(console, picture)
+            print_line(console, says)
+    print_written(console, picture)
 
 
 def _front(compared: list[Compared]) -> list[Tried]:
-    return [one for each in compared for one in tradeoff.fronts(each.tried)]
+    return [one for each in compared for one in pareto.front(each.tried)]
 
 
-def _kernel_table(costs: list[loop.Cost], limit: loop.Arithmetic) -> Table:
-    table = Table()
-    for heading in ("triangles", "body [µs]", "each [ns]", "of the limit", "NumPy's time", "memory"):
-        table.add_column(escape(heading), justify="right")
+def _kernel_table(costs: list[kernel.Cost], limit: kernel.Arithmetic) -> Table:
+    headings = ("triangles", "body [µs]", "each [ns]", "of the limit", "NumPy's time", "memory")
+    table = make_table(None, (), headings)
     for cost in costs:
         table.add_row(
             f"{cost.triangles}",
@@ -142,9 +138,7 @@ def _number(value: float) -> float | None:
 
 
 def _single_table(rows: list[Timed]) -> Table:
-    table = _table("one simulation", "scene", "sand")
-    for heading in ("triangles", "µs", "x", "real", "work"):
-        table.add_column(escape(heading), justify="right", no_wrap=True)
+    table = make_table("one simulation", ("scene", "sand"), ("triangles", "µs", "x", "real", "work"))
     for row in rows:
         table.add_row(
             *_head(row),
@@ -153,38 +147,29 @@ def _single_table(rows: list[Timed]) -> Table:
             f"{row.ratio:.2f}",
             f"× {row.realtime:.0f}",
             f"{row.evaluations:.2f} + {row.derivatives:.2f}",
-            end_section=row.sand == sanded.SANDS[-1],
+            end_section=row.sand == environment.GROUNDS[-1],
         )
     return table
 
 
 def _batch_table(rows: list[Timed]) -> Table:
-    table = _table(f"{sanded.SIMULATIONS} simulations at once, each with sand of its own", "scene", "sand")
-    for threads in sanded.THREADS:
-        table.add_column(f"{threads} thread{'s' if threads > 1 else ''}", justify="right")
-        table.add_column("x", justify="right")
+    title = f"{environment.SIMULATIONS} simulations at once, each with sand of its own"
+    headings = [heading for n in environment.THREADS for heading in (f"{n} thread{'s' if n > 1 else ''}", "x")]
+    table = make_table(title, ("scene", "sand"), headings)
     for row in rows:
         cells = [cell for rate, share in row.batch.values() for cell in (f"{rate:,.0f}/s", f"{share:.2f}")]
-        table.add_row(*_head(row), *cells, end_section=row.sand == sanded.SANDS[-1])
-    return table
-
-
-def _table(title: str, *names: str) -> Table:
-    table = Table(title=title, title_justify="left")
-    for name in names:
-        table.add_column(name, no_wrap=True)
+        table.add_row(*_head(row), *cells, end_section=row.sand == environment.GROUNDS[-1])
     return table
 
 
 def _head(row: Timed) -> tuple[str, str]:
+    """The first cells of a row, the scene in the first row of each only."""
     return f"{row.subject}, {row.law}" if row.sand == "none" else "", row.sand
 
 
 def _meshes_table(compared: list[Compared]) -> Table:
-    table = _table("elements, and largest error of the wrench [%]", "scene")
     meshes = list(dict.fromkeys(one.mesh for each in compared for one in each.tried))
-    for mesh in meshes:
-        table.add_column(mesh, justify="right", no_wrap=True)
+    table = make_table("elements, and largest error of the wrench [%]", ("scene",), meshes)
     for each in compared:
         found = {one.mesh: f"{one.elements}: {_percent(one.wrench_error)}" for one in each.tried}
         table.add_row(f"{each.tried[0].subject}, {each.tried[0].law}", *(found[mesh] for mesh in meshes))
@@ -192,9 +177,8 @@ def _meshes_table(compared: list[Compared]) -> Table:
 
 
 def _front_table(front: list[Tried]) -> Table:
-    table = _table("what nothing cheaper comes near", "scene", "force")
-    for heading in ("elements", "ms", "error %", "µs", "real"):
-        table.add_column(escape(heading), justify="right", no_wrap=True)
+    headings = ("elements", "ms", "error %", "µs", "real")
+    table = make_table("what nothing cheaper comes near", ("scene", "force"), headings)
     for one, following in itertools.zip_longest(front, front[1:]):
         last = following is None or (following.subject, following.law) != (one.subject, one.law)
         table.add_row(

@@ -1,4 +1,4 @@
-"""`rftsim demo`: what `make demo` runs."""
+"""`rftsim demo`: wheel and runner over their rates, which `make demo` runs."""
 
 import dataclasses
 import os
@@ -6,16 +6,15 @@ from collections.abc import Callable
 from pathlib import Path
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
-from rftsim.cli.output import print_json
+from rftsim.cli.output import print_json, print_line, progress
+from rftsim.cli.results import draw, picture_in
 from rftsim.errors import RftsimError
-from rftsim.files import check_writable, replacing
 from rftsim.run.rates import LAWS, RATES, Point, measure_all, points
 from rftsim.run.run import run
 from rftsim.run.scenes import stage
-from rftsim.view.plots import plot_demo
+from rftsim.view.rates import plot_rates
 
 
 @dataclasses.dataclass(frozen=True)
@@ -28,23 +27,18 @@ class Demo:
     out: Path = Path("out/demo")
     """Folder for demo.png and grouser-wheel.rrd."""
     processes: int = os.cpu_count() or 1
-    """Runs at a time."""
+    """Runs that are simulated at a time."""
     json: bool = False
     """Print JSON instead of the table."""
 
     def __call__(self, warnings: Callable[[], list[str]]) -> None:
-        """Run, print, draw and record."""
+        """Run every point, print and draw them, and record the wheel."""
         if self.processes < 1:
             raise RftsimError(f"processes must be at least 1, not {self.processes}")
-        try:
-            self.out.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise RftsimError(f"cannot make the folder {self.out}: {error.strerror}") from error
-        plot, recording = self.out / "demo.png", self.out / "grouser-wheel.rrd"
-        check_writable(plot)
-        found = self._measure()
-        with replacing(plot) as temporary:
-            plot_demo(found, temporary)
+        picture, recording = picture_in(self.out, "demo"), self.out / "grouser-wheel.rrd"
+        with progress("wheel and runner on sand", len(points()), self.json) as report:
+            found = measure_all(self.processes, lambda point: report("wheel and runner on sand"))
+        draw(picture, plot_rates, found)
         staged = stage("grouser-wheel", settings={"rpm": "60"}, duration=2.0)
         from rftsim.view.record import Recorder  # rerun is an extra
 
@@ -56,14 +50,7 @@ class Demo:
         console = Console()
         for scene in RATES:
             console.print(_table(scene, [point for point in found if point.scene == scene]))
-        console.print(f"wrote {plot} and {recording}: open the recording with `rerun {recording}`", highlight=False)
-
-    def _measure(self) -> list[Point]:
-        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
-        console = Console(stderr=True)
-        with Progress(*columns, TimeElapsedColumn(), TimeRemainingColumn(), console=console, disable=self.json) as bar:
-            task = bar.add_task("wheel and runner on sand", total=len(points()))
-            return measure_all(self.processes, lambda point: bar.advance(task))
+        print_line(console, f"wrote {picture} and {recording}: open the recording with `rerun {recording}`")
 
 
 def _table(scene: str, found: list[Point]) -> Table:

@@ -1,6 +1,7 @@
 """`rftsim evaluate`: how good policies are, on which ground."""
 
 import dataclasses
+import itertools
 import math
 from collections.abc import Callable
 from pathlib import Path
@@ -8,19 +9,19 @@ from typing import TYPE_CHECKING, Any
 
 import tyro
 from rich.console import Console
-from rich.markup import escape
 from rich.progress import Progress
-from rich.table import Table
 
 from rftsim.cli.extra import needing
-from rftsim.cli.output import print_json
+from rftsim.cli.output import make_table, print_json, print_written
+from rftsim.cli.results import draw
 from rftsim.errors import RftsimError
-from rftsim.files import check_writable, replacing
+from rftsim.files import check_writable
 
 if TYPE_CHECKING:
     from rftsim_envs.training.evaluate import Score
 
 NUMBERS = {"speed": "speed [m/s]", "cost_of_transport": "CoT", "early": "early [%]"}
+"""Headings of what is printed beside the return, by name."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -38,7 +39,7 @@ class Evaluate:
     on: str | None = None
     """Names of grounds with commas between them; by default all for one folder, and sand,rigid for several."""
     episodes: int = 20
-    """On each ground."""
+    """Number of episodes on each ground."""
     seed: int = 10_000
     """Episode k is seeded with seed + k."""
     baseline: bool = False
@@ -55,7 +56,7 @@ class Evaluate:
     """Print JSON."""
 
     def __call__(self, warnings: Callable[[], list[str]]) -> None:
-        """Score, print and draw."""
+        """Score the runs on every ground, print the scores and draw them."""
         with needing("train"):
             from rftsim_envs.training import evaluate
             from rftsim_envs.training.folder import Folder
@@ -69,12 +70,10 @@ class Evaluate:
         default = evaluate.grid(plans[self.runs[0]]) if len(runs) == 1 else ["sand", "rigid"]
         grounds = default if self.on is None else [name.strip() for name in self.on.split(",")]
         jobs = {}
-        for group in runs.values():
-            for run in group:
-                for name in grounds:
-                    if evaluate.settings_on(Folder(run).plan(), name) is None:
-                        raise RftsimError(f"{name} has no density, which the law of {run} needs")
-                    jobs[f"{run} on {name}"] = (run, name, self.episodes, self.seed, self.threads, self.baseline)
+        for run, name in itertools.product(itertools.chain(*runs.values()), grounds):
+            if evaluate.settings_on(Folder(run).plan(), name) is None:
+                raise RftsimError(f"{name} has no density, which the law of {run} needs")
+            jobs[f"{run} on {name}"] = (run, name, self.episodes, self.seed, self.threads, self.baseline)
         with needing("ray"), Progress(console=Console(stderr=True), transient=True, disable=self.json) as bar:
             task = bar.add_task("episodes", total=len(jobs))
             found = spread(evaluate.score, jobs, self.ray, lambda name, scores: bar.advance(task))
@@ -84,10 +83,9 @@ class Evaluate:
         }
         names = {group: _name(plans[group], group, len(own)) for group, own in runs.items()}
         if self.plot:
-            from rftsim.view.plots import plot_returns
+            from rftsim.view.returns import plot_returns
 
-            with replacing(self.plot) as temporary:
-                plot_returns({names[group]: own for group, own in scores.items()}, temporary)
+            draw(self.plot, plot_returns, {names[group]: own for group, own in scores.items()})
         self._print(scores, names, grounds)
 
     def _print(self, scores: "dict[Path, list[Score]]", names: dict[Path, str], grounds: list[str]) -> None:
@@ -104,14 +102,11 @@ class Evaluate:
             lines.insert(1, " | ".join(["---"] + ["---:"] * (len(rows[0]) - 1)))
             print("\n".join(f"| {line} |" for line in lines) + f"\n\n    {self._command()}")
             return
-        table = Table(title=title, title_justify="left")
-        for k, name in enumerate(rows[0]):
-            table.add_column(escape(name), justify="right" if k else "left")
+        table = make_table(title, rows[0][:1], rows[0][1:], wrap=True)
         for row in rows[1:]:
             table.add_row(*row)
         Console().print(table)
-        if self.plot:
-            Console().print(f"wrote {self.plot}", highlight=False)
+        print_written(Console(), self.plot)
 
     def _command(self) -> str:
         chosen = f" --on {self.on!r}" if self.on and " " in self.on else f" --on {self.on}" if self.on else ""

@@ -1,4 +1,4 @@
-"""What is installed only on request."""
+"""Needs that are installed only on request: the extras of rftsim."""
 
 import contextlib
 from collections.abc import Iterator
@@ -7,14 +7,15 @@ from typing import Final
 from rftsim.errors import RftsimError
 
 OURS: Final = ("rftsim", "rftsim_envs", "rftsim_models", "rftsim_mpm")
+"""Packages that no extra brings, so that one that is missing is a mistake of ours."""
 
 
 @contextlib.contextmanager
 def needing(extra: str) -> Iterator[None]:
-    """Imports that need an extra of rftsim.
+    """Import within this block what needs an extra of rftsim.
 
     Raises:
-        RftsimError: It is not installed.
+        RftsimError: The extra is not installed.
     """
     try:
         yield

@@ -1,4 +1,4 @@
-"""`rftsim fit`: from data to law."""
+"""`rftsim fit`: from data to a law, or to the parameters of a sand."""
 
 import dataclasses
 from collections.abc import Callable, Mapping
@@ -8,10 +8,10 @@ from typing import Annotated, Any, Literal
 import numpy as np
 import tyro
 from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
 
-from rftsim.cli.output import print_json
+from rftsim.cli.output import print_doubts, print_json, print_line, print_written
+from rftsim.cli.results import draw, picture_in
 from rftsim.errors import RftsimError
 from rftsim.files import check_writable, replacing
 from rftsim.fit import trials
@@ -39,7 +39,7 @@ class Map:
     output: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
     """Where the law and its sand are written, .toml."""
     degree: Literal[3, 4] = 3
-    """Of the polynomials: 20 terms each, or 35."""
+    """Degree of the polynomials, of 20 terms each or of 35."""
     dissipative: bool = False
     """Never add energy: alpha_gen . v <= 0 at every orientation and motion."""
     prior: float | None = None
@@ -56,12 +56,12 @@ class Map:
     """Print JSON."""
 
     def __call__(self, warnings: Callable[[], list[str]]) -> None:
-        """Fit, print, write and draw."""
+        """Fit the data, print the result, write it and draw it."""
         if self.output:
             check_writable(self.output, ".toml")
         if self.prior is not None and not self.prior >= 0.0:
             raise RftsimError(f"prior must be zero or more plates, not {self.prior:g}")
-        picture = _picture(self.plot, "fit-map.png")
+        picture = picture_in(self.plot, "fit-map")
         plates, sand, campaigns = self._read()
         settings = Settings(self.degree, self.prior or 0.0, self.dissipative)
         with Console(stderr=True).status("fitting"):
@@ -75,9 +75,7 @@ class Map:
                 temporary.write_text(
                     law_text(found.generic.table, {"sand": sand, "fit": {**summary, "doubts": doubts}})
                 )
-        if picture:
-            with replacing(picture) as temporary:
-                plot_map(found, ", ".join(path.name for path in self.data), temporary)
+        draw(picture, plot_map, found, ", ".join(path.name for path in self.data))
         if self.json:
             worst = [one._asdict() for one in found.worst()]
             terms = [[*powers, *coefficients] for powers, coefficients in found.generic.table]
@@ -86,8 +84,8 @@ class Map:
             return
         _print_map(found, sand, flat)
         console = Console()
-        _print_doubts(console, doubts)
-        _print_written(console, self.output, picture)
+        print_doubts(console, doubts)
+        print_written(console, self.output, picture)
 
     def _read(self) -> tuple[Plates, dict[str, Any], list[Campaign]]:
         """The plates of all data, their one sand, and the campaigns."""
@@ -110,7 +108,7 @@ class Map:
 
 
 def _summary(found: Report, data: list[str]) -> dict[str, Any]:
-    """What is written and printed of a fit, beside its table."""
+    """The numbers of a fit that are written and printed, beside its table."""
     return {
         "data": data,
         "plates": found.plates.n,
@@ -174,12 +172,12 @@ def _flat(row: Mapping[str, float]) -> dict[str, float]:
 
 @dataclasses.dataclass(frozen=True)
 class _Trial:
-    """What the trials have in common."""
+    """The options that all trials have, and the way from their data to a sand."""
 
     data: tyro.conf.Positional[Path]
     """CSV file with one row for each reading; columns are named below."""
     known: str = ""
-    """What else is known of the sand: key=value,... or a TOML file; goes into the line that is printed."""
+    """Parameters of the sand that are known: key=value,... or a TOML file; they go into the line that is printed."""
     output: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
     """Where the sand is written, .toml, for --sand."""
     plot: Path | None = None
@@ -187,17 +185,17 @@ class _Trial:
     json: bool = False
     """Print JSON."""
 
-    def found(self) -> trials.Found:
-        """What the trial says."""
+    def estimate(self) -> trials.Found:
+        """Estimate the sand's parameters from the data of the trial."""
         raise NotImplementedError
 
     def __call__(self, warnings: Callable[[], list[str]]) -> None:
-        """Fit, print, write and draw."""
+        """Fit the data, print the result, write it and draw it."""
         kind = type(self).__name__.lower()
         if self.output:
             check_writable(self.output, ".toml")
-        picture = _picture(self.plot, f"fit-{kind}.png")
-        found = self.found()
+        picture = picture_in(self.plot, f"fit-{kind}")
+        found = self.estimate()
         parameters = _known(self.known) | found.parameters
         if "xi_n" in found.parameters and "zeta" not in found.parameters:
             parameters.pop("zeta", None)  # follows from xi_n
@@ -209,9 +207,7 @@ class _Trial:
             rounded = {name: float(f"{value:.8g}") for name, value in parameters.items()}
             with replacing(self.output) as temporary:
                 temporary.write_text(toml({"sand": {**rounded, "source": f"rftsim fit {kind}, {self.data.name}"}}))
-        if picture:
-            with replacing(picture) as temporary:
-                plot_trial(found, f"rftsim fit {kind} {self.data.name}", temporary)
+        draw(picture, plot_trial, found, f"rftsim fit {kind} {self.data.name}")
         if self.json:
             estimates = {name: one._asdict() for name, one in found.estimates.items()}
             print_json({"estimates": estimates, "sand": parameters, "warnings": [*found.doubts, *warnings()]})
@@ -222,9 +218,9 @@ class _Trial:
             ends = (f"{low:.4g} to {high:.4g}" for low, high in ((one.low, one.high), (one.boot_low, one.boot_high)))
             table.add_row(f"{name} [{trials.UNITS[name]}]", f"{one.value:.4g}", *ends)
         console.print(table)
-        _print_doubts(console, found.doubts)
-        console.print(trials.sand_line(parameters), highlight=False, soft_wrap=True)
-        _print_written(console, self.output, picture)
+        print_doubts(console, found.doubts)
+        print_line(console, trials.sand_line(parameters))
+        print_written(console, self.output, picture)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -237,10 +233,10 @@ class Plate(_Trial):
     """
 
     area: float | None = None
-    """Of the plate [m^2]."""
+    """Area of the plate [m^2], where the data have no such column."""
 
-    def found(self) -> trials.Found:
-        """What the trial says."""
+    def estimate(self) -> trials.Found:
+        """Estimate the sand's parameters from the data of the trial."""
         return trials.pushed(self.data, self.area)
 
 
@@ -257,10 +253,10 @@ class Drag(_Trial):
     rho_c: float
     """Density of the sand [kg/m^3]."""
     area: float | None = None
-    """Of the plate [m^2]."""
+    """Area of the plate [m^2], where the data have no such column."""
 
-    def found(self) -> trials.Found:
-        """What the trial says."""
+    def estimate(self) -> trials.Found:
+        """Estimate the sand's parameters from the data of the trial."""
         return trials.dragged(self.data, self.area, self.rho_c)
 
 
@@ -274,8 +270,8 @@ class Friction(_Trial):
     Example: rftsim fit friction slide.csv --known xi_n=1.1e6
     """
 
-    def found(self) -> trials.Found:
-        """What the trial says."""
+    def estimate(self) -> trials.Found:
+        """Estimate the sand's parameters from the data of the trial."""
         return trials.slid(self.data)
 
 
@@ -295,25 +291,6 @@ def _known(text: str) -> dict[str, float]:
     return found
 
 
-def _picture(folder: Path | None, name: str) -> Path | None:
-    if folder is None:
-        return None
-    folder.mkdir(parents=True, exist_ok=True)
-    check_writable(folder / name)
-    return folder / name
-
-
-def _print_doubts(console: Console, doubts: list[str]) -> None:
-    for doubt in doubts:
-        console.print(f"[yellow]warning:[/yellow] {escape(doubt)}", highlight=False, soft_wrap=True)
-
-
-def _print_written(console: Console, *paths: Path | None) -> None:
-    for path in paths:
-        if path:
-            console.print(f"wrote {path}", highlight=False, soft_wrap=True)
-
-
 @dataclasses.dataclass(frozen=True)
 class Fit:
     """From data to law: a table of 3D-RFT from plates, or a sand's parameters from trials.
@@ -329,5 +306,5 @@ class Fit:
     )
 
     def __call__(self, warnings: Callable[[], list[str]]) -> None:
-        """Fit what was asked for."""
+        """Fit the law or the trial that was asked for."""
         self.what(warnings)

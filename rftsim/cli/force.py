@@ -7,12 +7,13 @@ from pathlib import Path
 import tyro
 from rich.console import Console
 
-from rftsim.cli.output import print_json
+from rftsim.cli.output import print_json, print_line
 from rftsim.law.rigid import surface_force
 from rftsim.sand.presets import make_sand
 from rftsim.surface.triangles import load_surface
 
 Vector = tuple[float, float, float]
+"""Three numbers on the command line: x, y, z."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -45,7 +46,7 @@ class Force:
     """Print JSON."""
 
     def __call__(self, warnings: Callable[[], list[str]]) -> None:
-        """Evaluate and print."""
+        """Evaluate the law on the mesh, and print the result."""
         sand = make_sand(self.sand)
         surface = load_surface(self.mesh, scale=self.scale, allow_open=self.allow_open)
         result = surface_force(
@@ -77,4 +78,4 @@ class Force:
         console.print(f"power   {result.power:14.6g}  W")
         console.print(f"{report['active']} of {surface.ntri} triangles active, area {surface.areas.sum():.6g} m^2")
         for note in surface.notes:
-            console.print(f"note: {note}", highlight=False, soft_wrap=True)
+            print_line(console, f"note: {note}")

@@ -1,26 +1,25 @@
-"""`rftsim inspect`: what would be modelled of a scene, and why."""
+"""`rftsim inspect`: the parts of a scene that would be modelled, and why."""
 
 import dataclasses
 from collections.abc import Callable
-from typing import Annotated, Any
+from typing import Any
 
 import tyro
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from rftsim.cli.output import print_json
+from rftsim.cli.output import print_json, print_line
+from rftsim.cli.settings import Settings, read_settings
 from rftsim.errors import RftsimError
 from rftsim.model.add_sand import Bed
 from rftsim.run.advice import advise
 from rftsim.run.scenes import Staged, stage
 
-Settings = Annotated[tuple[tuple[str, ...], ...], tyro.conf.UseAppendAction]
-
 
 @dataclasses.dataclass(frozen=True)
 class Inspect:
-    """What would be modelled of a scene: bodies, triangles, law, sand, and why; and what of it the scene needs.
+    """Show how a scene would be modelled: bodies, triangles, law, sand, and why; and how much of it the scene needs.
 
     Example: rftsim inspect robot.xml --sand poppy-seeds --tolerance 0.01
     """
@@ -28,9 +27,9 @@ class Inspect:
     scene: tyro.conf.Positional[str]
     """A shipped scene (grouser-wheel, half-grouser-wheel, four-flap-runner, intruder) or an MJCF file."""
     law: str | None = None
-    """Instead of the scene's law."""
+    """Law to take instead of the scene's."""
     sand: str | None = None
-    """Instead of the scene's sand: a preset, key=value,... or a TOML file."""
+    """Sand to take instead of the scene's: a preset, key=value,... or a TOML file."""
     set: Settings = ()
     """Settings of a shipped scene, key=value ...; may be repeated."""
     tolerance: float = 0.01
@@ -45,7 +44,7 @@ class Inspect:
     """Print JSON."""
 
     def __call__(self, warnings: Callable[[], list[str]]) -> None:
-        """Stage the scene, whole and reduced, and print."""
+        """Stage the scene, whole and reduced, and print how it is modelled."""
         if self.speed is not None and not self.speed >= 0.0:
             raise RftsimError(f"the speed must be zero or more, not {self.speed:g} m/s")
         whole, lean = self._stage(None), self._stage(self.tolerance)
@@ -76,17 +75,17 @@ class Inspect:
         console.print("sand  " + ", ".join(f"{k} {v:g}" if k != "source" else v for k, v in given.items()))
         console.print(_table(bodies, self.tolerance))
         for name, row in bodies.items():
-            console.print(f"{name}: {row['why']}", highlight=False, soft_wrap=True)
+            print_line(console, f"{name}: {row['why']}")
         for one in advice:
             change = "keep" if one.law == bed.law.name else f"--law {one.law}, not"
-            console.print(f"law: {change} {bed.law.name}: {one.reason}", highlight=False, soft_wrap=True)
+            print_line(console, f"law: {change} {bed.law.name}: {one.reason}")
 
     def _stage(self, tolerance: float | None) -> Staged:
         return stage(
             self.scene,
             sand=self.sand,
             law=self.law,
-            settings=settings(self.set),
+            settings=read_settings(self.set),
             tolerance=tolerance,
             disable_floor=self.disable_floor,
             allow_open=self.allow_open,
@@ -118,18 +117,3 @@ def _table(bodies: dict[str, dict[str, Any]], tolerance: float) -> Table:
         counts = str(row["triangles"]), str(row["needed"])
         table.add_row(name, *counts, *errors, f"{row['area_m2']:.4g}", "yes" if row["wheel"] else "")
     return table
-
-
-def settings(groups: Settings) -> dict[str, str]:
-    """Settings from `key=value` words.
-
-    Raises:
-        ValueError: A word is not key=value.
-    """
-    found = {}
-    for pair in (pair for group in groups for pair in group):
-        key, separator, value = pair.partition("=")
-        if not separator or not key:
-            raise ValueError(f"--set takes key=value, not {pair!r}")
-        found[key] = value
-    return found

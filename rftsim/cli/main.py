@@ -14,6 +14,7 @@ from rftsim.cli.evaluate import Evaluate
 from rftsim.cli.fit import Fit
 from rftsim.cli.force import Force
 from rftsim.cli.inspect import Inspect
+from rftsim.cli.output import print_doubts, print_line
 from rftsim.cli.play import Play
 from rftsim.cli.run import Run
 from rftsim.cli.train import Train
@@ -35,7 +36,7 @@ Command = (
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run one command; exits with 2 where its input cannot be."""
+    """Run the command that the arguments name; exit with 2 where its input cannot be."""
     console = Console(stderr=True)
     command: Any = tyro.cli(
         Command,
@@ -47,15 +48,14 @@ def main(arguments: list[str] | None = None) -> None:
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", RftsimWarning)
         try:
-            command(lambda: said(caught))
+            command(lambda: texts_of(caught))
         except (RftsimError, ValueError, OSError) as error:
-            console.print(f"[red]error:[/red] {escape(str(error))}", highlight=False, soft_wrap=True)
+            print_line(console, f"[red]error:[/red] {escape(str(error))}")
             sys.exit(2)
         finally:
-            for text in said(caught):
-                console.print(f"[yellow]warning:[/yellow] {escape(text)}", highlight=False, soft_wrap=True)
+            print_doubts(console, texts_of(caught))
 
 
-def said(caught: list[warnings.WarningMessage]) -> list[str]:
-    """The distinct warnings, in order."""
+def texts_of(caught: list[warnings.WarningMessage]) -> list[str]:
+    """The texts of the distinct warnings, in the order in which they came."""
     return list(dict.fromkeys(str(warning.message) for warning in caught))

@@ -1,24 +1,29 @@
-"""`rftsim play`: watch a policy, or what it is compared with."""
+"""`rftsim play`: watch a policy, or the actions that it is compared with."""
 
 import contextlib
 import dataclasses
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import tyro
 from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
 
 from rftsim.cli.extra import needing
-from rftsim.cli.inspect import Settings, settings
-from rftsim.cli.output import print_json
+from rftsim.cli.output import make_table, print_json, print_written
+from rftsim.cli.settings import Settings, read_settings
 from rftsim.errors import RftsimError
 from rftsim.files import check_writable, replacing
 
+if TYPE_CHECKING:
+    from rftsim_envs.env import SandEnv
+    from rftsim_envs.training.actors import Maker
+    from rftsim_envs.training.folder import Folder
+
 SHOWN = {"r": "return", "l": "steps", "speed": "speed [m/s]", "command": "commanded [m/s]", "slip": "slip"}
 SHOWN |= {"power": "power [W]", "cost_of_transport": "cost of transport"}
+"""Headings of what an episode came to, by name."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -33,9 +38,9 @@ class Play:
     actions: Literal["policy", "zero", "random"] | None = None
     """Who acts: by default the policy of a folder, and random actions in an environment."""
     episodes: int = 1
-    """How many."""
+    """Number of episodes."""
     seconds: float | None = None
-    """Cut episodes there [s]."""
+    """Longest time of an episode [s], at which it is cut."""
     seed: int = 0
     """Episode k is seeded with seed + k."""
     set: Settings = ()
@@ -50,10 +55,10 @@ class Play:
     """Print JSON."""
 
     def __call__(self, warnings: Callable[[], list[str]]) -> None:
-        """Play and report."""
+        """Play the episodes, show them, and print what they came to."""
         with needing("train"):
             from rftsim_envs.env import SandEnv
-            from rftsim_envs.training import actors, play
+            from rftsim_envs.training import play
             from rftsim_envs.training.folder import Folder, make_plan
         if self.episodes < 1 or (self.seconds is not None and not self.seconds > 0.0):
             raise RftsimError("episodes must be at least 1, and seconds positive")
@@ -62,55 +67,61 @@ class Play:
         who = self.actions or ("policy" if folder.exists else "random")
         if who == "policy" and not folder.exists:
             raise RftsimError(f"{self.run} is no folder of `rftsim train`: it has no policy")
-        maker = actors.trained(folder) if who == "policy" else actors.zero
-        maker = actors.at_random(self.seed) if who == "random" else maker
         with contextlib.ExitStack() as stack:
-            env = SandEnv(
-                plan.task,
-                "rgb_array" if self.video else None,
-                *play.SIZE,
-                **(plan.settings | settings(self.set)),
-            )
+            given = plan.settings | read_settings(self.set)
+            env = SandEnv(plan.task, "rgb_array" if self.video else None, *play.SIZE, **given)
             stack.callback(env.close)
-            watchers: list[Callable[[Mapping[str, Any]], None]] = []
-            if self.record:
-                check_writable(self.record, ".rrd")
-                with needing("rerun"):
-                    from rftsim_envs.watch import Watch
-                watchers.append(stack.enter_context(Watch(env.episodes, self.record)).log)
-            if self.video:
-                check_writable(self.video, ".mp4")
-                with needing("video"):
-                    import av  # noqa: F401
-                film = stack.enter_context(replacing(self.video))
-                watchers.append(stack.enter_context(play.filming(env, film)))
-
-            if self.picture:
-                check_writable(self.picture, ".png")
-                strip = stack.enter_context(replacing(self.picture))
-                watchers.append(stack.enter_context(play.taking_strip(env, strip)))
+            watchers = self._watchers(env, stack)
 
             def watch(info: Mapping[str, Any]) -> None:
                 for one in watchers:
                     one(info)
 
+            maker = self._maker(who, folder)
             found = list(play.play(env, maker, self.episodes, self.seed, seconds=self.seconds, watch=watch))
-        written = [str(path) for path in (self.record, self.video, self.picture) if path]
+        paths = [path for path in (self.record, self.video, self.picture) if path]
+        name = plan.as_json()["env"]
         if self.json:
-            print_json({"env": plan.as_json()["env"], "actions": who, "episodes": found, "written": written})
+            print_json({"env": name, "actions": who, "episodes": found, "written": [str(path) for path in paths]})
             return
         console = Console()
-        console.print(_table(f"{plan.as_json()['env']}, {who}", found))
-        for name in written:
-            console.print(f"wrote {name}", highlight=False)
+        console.print(_table(f"{name}, {who}", found))
+        print_written(console, *paths)
+
+    def _maker(self, who: str, folder: "Folder") -> "Maker":
+        """Whoever chooses the actions, by the word for it."""
+        from rftsim_envs.training import actors
+
+        if who == "policy":
+            return actors.trained(folder)
+        return actors.at_random(self.seed) if who == "random" else actors.zero
+
+    def _watchers(self, env: "SandEnv", stack: contextlib.ExitStack) -> list[Callable[[Mapping[str, Any]], None]]:
+        """Functions that show each control step: in a recording, a film and a picture, where these are asked for."""
+        from rftsim_envs.training import play
+
+        watchers: list[Callable[[Mapping[str, Any]], None]] = []
+        if self.record:
+            check_writable(self.record, ".rrd")
+            with needing("rerun"):
+                from rftsim_envs.watch import Watch
+            watchers.append(stack.enter_context(Watch(env.episodes, self.record)).log)
+        if self.video:
+            check_writable(self.video, ".mp4")
+            with needing("video"):
+                import av  # noqa: F401
+            film = stack.enter_context(replacing(self.video))
+            watchers.append(stack.enter_context(play.filming(env, film)))
+        if self.picture:
+            check_writable(self.picture, ".png")
+            strip = stack.enter_context(replacing(self.picture))
+            watchers.append(stack.enter_context(play.taking_strip(env, strip)))
+        return watchers
 
 
 def _table(title: str, found: list[dict[str, float]]) -> Table:
-    table = Table(title=title, title_justify="left")
-    table.add_column("episode", justify="right")
-    shown = {name: said for name, said in SHOWN.items() if name in found[0]}
-    for said in shown.values():
-        table.add_column(escape(said), justify="right")
+    shown = {name: heading for name, heading in SHOWN.items() if name in found[0]}
+    table = make_table(title, (), ("episode", *shown.values()), wrap=True)
     for k, episode in enumerate(found):
         table.add_row(str(k), *(f"{episode[name]:.4g}" for name in shown))
     return table

@@ -5,20 +5,22 @@ import dataclasses
 import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import mujoco
 import tyro
 from rich.console import Console
 from rich.progress import Progress
 
-from rftsim.cli.inspect import Settings, settings
-from rftsim.cli.output import print_json
-from rftsim.files import check_writable, replacing
+from rftsim.cli.output import print_doubts, print_json, print_written
+from rftsim.cli.results import draw
+from rftsim.cli.settings import Settings, read_settings
+from rftsim.files import check_writable
 from rftsim.run.run import SAMPLES, run
 from rftsim.run.run import Run as Finished
 from rftsim.run.scenes import Staged, stage
-from rftsim.view.plots import plot_history, save_picture
+from rftsim.view.history import plot_history
+from rftsim.view.render import save_picture
 
 
 @dataclasses.dataclass(frozen=True)
@@ -31,9 +33,9 @@ class Run:
     scene: tyro.conf.Positional[str]
     """A shipped scene (grouser-wheel, half-grouser-wheel, four-flap-runner, intruder) or an MJCF file."""
     law: str | None = None
-    """Instead of the scene's law."""
+    """Law to take instead of the scene's."""
     sand: str | None = None
-    """Instead of the scene's sand: a preset, key=value,... or a TOML file."""
+    """Sand to take instead of the scene's: a preset, key=value,... or a TOML file."""
     set: Settings = ()
     """Settings of a shipped scene, key=value ...; may be repeated."""
     force: Literal["implicit", "explicit"] = "implicit"
@@ -41,9 +43,9 @@ class Run:
     tolerance: float | None = None
     """Model only what the scene needs: the fewest elements whose wrench errs by at most this share, as 0.01."""
     duration: float | None = None
-    """Simulated time [s]."""
+    """Simulated time [s]; by default the scene's."""
     timestep: float | None = None
-    """[s]."""
+    """Time step [s]; by default the scene's."""
     record: Path | None = None
     """Write a Rerun recording, .rrd."""
     plot: Path | None = None
@@ -58,18 +60,35 @@ class Run:
     """Print JSON."""
 
     def __call__(self, warnings: Callable[[], list[str]]) -> None:
-        """Run and report."""
+        """Run the scene, draw it, and print its steady state."""
         if self.record:
             check_writable(self.record, ".rrd")
         if self.plot:
             check_writable(self.plot, ".png", ".pdf", ".svg")
         if self.picture:
             check_writable(self.picture, ".png")
-        staged = stage(
+        staged = self._stage()
+        finished = self._simulate(staged)
+        draw(self.plot, plot_history, finished.history, f"{self.scene}, {staged.bed.law.name}")
+        draw(self.picture, save_picture, staged.model, finished.last, staged.measured.body)
+        if self.json:
+            print_json(self._report(staged, finished, warnings()))
+            return
+        console, steady = Console(), finished.steady
+        slip = "" if steady.slip is None else f", slip {steady.slip:.3f}"
+        law = staged.bed.law.name
+        console.print(f"[bold]{self.scene}[/bold], law {law}, {staged.duration:g} s", highlight=False)
+        console.print(f"speed {steady.speed:.4g} m/s, sinkage {steady.sinkage:.4g} m{slip}")
+        console.print(f"{finished.realtime_factor:.3g} times real time")
+        print_doubts(console, finished.doubts)
+        print_written(console, self.plot, self.picture, self.record)
+
+    def _stage(self) -> Staged:
+        return stage(
             self.scene,
             sand=self.sand,
             law=self.law,
-            settings=settings(self.set),
+            settings=read_settings(self.set),
             timestep=self.timestep,
             duration=self.duration,
             force=self.force,
@@ -77,15 +96,10 @@ class Run:
             disable_floor=self.disable_floor,
             allow_open=self.allow_open,
         )
-        finished = self._simulate(staged)
-        if self.plot:
-            with replacing(self.plot) as temporary:
-                plot_history(finished.history, f"{self.scene}, {staged.bed.law.name}", temporary)
-        if self.picture:
-            with replacing(self.picture) as temporary:
-                save_picture(staged.model, finished.last, staged.measured.body, temporary)
+
+    def _report(self, staged: Staged, finished: Finished, warnings: list[str]) -> dict[str, Any]:
         steady = finished.steady
-        report = {
+        return {
             "scene": self.scene,
             "law": staged.bed.law.name,
             "sand": dataclasses.asdict(staged.bed.sand),
@@ -96,21 +110,8 @@ class Run:
             "slip": steady.slip,
             "rate_rad_s": steady.rate,
             "realtime_factor": finished.realtime_factor,
-            "warnings": [*warnings(), *finished.doubts],
+            "warnings": [*warnings, *finished.doubts],
         }
-        if self.json:
-            print_json(report)
-            return
-        console = Console()
-        slip = "" if steady.slip is None else f", slip {steady.slip:.3f}"
-        console.print(f"[bold]{self.scene}[/bold], law {report['law']}, {staged.duration:g} s", highlight=False)
-        console.print(f"speed {steady.speed:.4g} m/s, sinkage {steady.sinkage:.4g} m{slip}")
-        console.print(f"{finished.realtime_factor:.3g} times real time")
-        for doubt in finished.doubts:
-            console.print(f"[yellow]warning:[/yellow] {doubt}", highlight=False, soft_wrap=True)
-        for path in (self.plot, self.picture, self.record):
-            if path:
-                console.print(f"wrote {path}", highlight=False)
 
     def _simulate(self, staged: Staged) -> Finished:
         samples = min(SAMPLES, math.ceil(staged.duration / staged.model.opt.timestep))

@@ -7,16 +7,19 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from rftsim.bench.hard_cases import CASES, Force
+from rftsim.bench.hard_cases import CASES
 from rftsim.bench.stability import FORCES, STEPS, Row, Starts, Study, Summary, run, summarise
-from rftsim.cli.output import print_json
-from rftsim.cli.studies import draw, picture_in, progress, remembered_in, say
+from rftsim.bench.stability_picture import plot_stability
+from rftsim.bench.trials import Force
+from rftsim.cli.output import make_table, print_json, print_line, print_written, progress
+from rftsim.cli.results import draw, picture_in, remembered_in
 from rftsim.errors import RftsimError
-from rftsim.view.plots import plot_stability
 
 
-def stability(cases: tuple[str, ...], starts: int, quick: bool, memory: Path, plot: Path | None, json: bool) -> None:
-    """Play the hard cases.
+def play_hard_cases(
+    cases: tuple[str, ...], starts: int, quick: bool, memory: Path, plot: Path | None, json: bool
+) -> None:
+    """Play the hard cases and the random starts, print what came of them, and draw it.
 
     Raises:
         RftsimError: There is no such case, or the number of starts is negative.
@@ -41,10 +44,11 @@ def stability(cases: tuple[str, ...], starts: int, quick: bool, memory: Path, pl
     for table in _tables(rows):
         console.print(table)
     _print_summary(console, summary, thrown)
-    say(console, picture)
+    print_written(console, picture)
 
 
 def _percent(value: float) -> str:
+    """An error in percent; a dash where there is none, `lost` where it is tenfold."""
     if math.isnan(value):
         return "-"
     if value > 9.995:
@@ -56,10 +60,7 @@ def _tables(rows: list[Row]) -> list[Table]:
     steps = sorted({h for row in rows for _, h in row.played})
 
     def table(title: str, cell: Callable[[Row, float], str]) -> Table:
-        found = Table(title=title, title_justify="left")
-        found.add_column("case", no_wrap=True)
-        for h in steps:
-            found.add_column(f"{1e3 * h:g} ms", justify="right", no_wrap=True)
+        found = make_table(title, ("case",), [f"{1e3 * h:g} ms" for h in steps])
         for row in rows:
             found.add_row(row.case, *(cell(row, h) for h in steps))
         return found
@@ -87,15 +88,15 @@ def _print_summary(console: Console, summary: Summary, starts: Starts) -> None:
 
     for line in (
         f"evaluations per step, mean over the cases: {listed(summary.evaluations)}",
-        f"derivatives per step (each about 3.5 evaluations): {listed(summary.jacobians)}",
+        f"derivatives per step (each about 3.5 evaluations): {listed(summary.derivatives)}",
         *(f"median error [%], {force}: {listed(error, 100)}" for force, error in summary.error.items()),
         f"a second at 5 ms implicit costs {summary.cost_ratio:.2f} of one at 1 ms explicit in the median, and is "
         f"nearer to the truth in {summary.nearer[0]} of {summary.nearer[1]} cases",
         f"{starts.starts} random starts at 5 ms: {starts.failed} lost, largest work of the sand in a step "
-        f"{starts.gain:.2g} J, {starts.evaluations:.2f} evaluations and {starts.jacobians:.2f} derivatives per step, "
+        f"{starts.gain:.2g} J, {starts.evaluations:.2f} evaluations and {starts.derivatives:.2f} derivatives per step, "
         f"{starts.unsolved} unsolved",
     ):
-        console.print(line, highlight=False, soft_wrap=True)
+        print_line(console, line)
 
 
 def _report(rows: list[Row], summary: Summary, starts: Starts) -> dict[str, object]:
@@ -113,7 +114,7 @@ def _report(rows: list[Row], summary: Summary, starts: Starts) -> dict[str, obje
         ],
         "summary": {
             "evaluations": summary.evaluations,
-            "jacobians": summary.jacobians,
+            "derivatives": summary.derivatives,
             "median_error": summary.error,
             "cost_ratio_implicit_5ms_explicit_1ms": summary.cost_ratio,
             "nearer_of": list(summary.nearer),

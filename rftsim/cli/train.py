@@ -13,8 +13,8 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from rftsim.cli.extra import needing
-from rftsim.cli.inspect import Settings, settings
-from rftsim.cli.output import print_json
+from rftsim.cli.output import print_json, print_line
+from rftsim.cli.settings import Settings, read_settings
 from rftsim.errors import RftsimError
 
 if TYPE_CHECKING:
@@ -37,11 +37,11 @@ class Train:
     out: Path
     """Folder of the run."""
     algo: Literal["ppo"] = "ppo"
-    """The algorithm."""
+    """Algorithm that the policy is trained by."""
     steps: int | None = None
     """Control steps in all; by default the task's. Rounded up to whole steps of all simulations."""
     seed: int = 0
-    """Of everything that is drawn."""
+    """Seed of everything that is drawn at random."""
     envs: int | None = None
     """Simulations side by side; by default the task's."""
     set: Settings = ()
@@ -63,14 +63,14 @@ class Train:
     """Print JSON instead of progress."""
 
     def __call__(self, warnings: Callable[[], list[str]]) -> None:
-        """Train and report."""
+        """Train one run or several, and say what came of each."""
         with needing("train"):
             from rftsim_envs.training.campaign import make_plans
             from rftsim_envs.training.folder import make_plan
-        changes: dict[str, Any] = settings(self.hyper)
+        changes: dict[str, Any] = read_settings(self.hyper)
         changes |= {"steps": self.steps} if self.steps is not None else {}
         changes |= {"n_envs": self.envs} if self.envs is not None else {}
-        given = settings(self.set)
+        given = read_settings(self.set)
         if self.seeds is None and not self.vary and self.ray is None:
             plans = {"": make_plan(self.env, given, changes, seed=self.seed, algo=self.algo)}
         else:
@@ -81,7 +81,7 @@ class Train:
             print_json({str(self.out / name): trained._asdict() for name, trained in found.items()})
         else:
             for name, one in found.items():
-                Console().print(_said(*one, self.out / name), highlight=False, soft_wrap=True)
+                print_line(Console(), _said(*one, self.out / name))
         if not all(one.done for one in found.values()):
             sys.exit(130)
 
@@ -125,7 +125,7 @@ def _values(groups: Settings) -> dict[str, list[str]]:
     """The values of each key in `key=value` words, in which a key may come again."""
     found: dict[str, list[str]] = {}
     for word in (word for group in groups for word in group):
-        ((key, value),) = settings(((word,),)).items()
+        ((key, value),) = read_settings(((word,),)).items()
         found.setdefault(key, []).append(value)
     return found
 
@@ -141,7 +141,7 @@ def _said(steps: int, began: int, done: bool, out: Path) -> str:
 
 @contextlib.contextmanager
 def interruptible() -> Iterator[Callable[[], bool]]:
-    """Ctrl-C, once, is a question that the block answers; a second one is KeyboardInterrupt, as ever."""
+    """Make the first Ctrl-C a question that the block answers; a second one is KeyboardInterrupt, as ever."""
     asked = False
 
     def ask(number: int, frame: object) -> None:
@@ -158,7 +158,7 @@ def interruptible() -> Iterator[Callable[[], bool]]:
 
 @contextlib.contextmanager
 def showing(name: str, steps: int, silent: bool) -> Iterator[Callable[[Mapping[str, Any]], None]]:
-    """A bar of the training's progress."""
+    """Show a bar of the training; the function that it gives is called with each row of progress.csv."""
     columns = (
         TextColumn("{task.description}"),
         TextColumn("{task.completed:,} of {task.total:,} steps"),

@@ -10,20 +10,19 @@ from typing import TYPE_CHECKING, Any
 import tyro
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
-from rftsim.cli.output import print_json
+from rftsim.cli.output import print_json, print_line, progress
+from rftsim.cli.results import draw, picture_in, remembered_in
 from rftsim.errors import RftsimError
-from rftsim.files import check_writable, replacing
 from rftsim.validation.measured import DATA
-from rftsim.validation.study import Request, Row
-from rftsim.view.plots import plot_study
+from rftsim.validation.study import Request, Row, plot_study
 
 if TYPE_CHECKING:
-    from rftsim.validation.studies import Found
+    from rftsim.validation.studies import Finished
 
 MARKS = {True: "pass", False: "FAIL", None: "-"}
+"""Words for whether a row passes."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -53,7 +52,7 @@ class Validate:
     """Print JSON."""
 
     def __call__(self, warnings: Callable[[], list[str]]) -> None:
-        """Measure, print and draw."""
+        """Measure the studies, print their tables and draw their figures."""
         from rftsim.validation.studies import choose  # which takes the continuum, and that numba
 
         names = choose(self.studies)
@@ -61,36 +60,28 @@ class Validate:
             raise RftsimError("--json and --markdown exclude one another: give one")
         if self.data is not None and not self.data.is_dir():
             raise RftsimError(f"no folder {self.data} of measured data")
-        pictures = {} if self.plot is None else {name: self.plot / f"{name}.png" for name in names}
-        for folder in (self.memory, self.plot):
-            if folder is not None:
-                folder.mkdir(parents=True, exist_ok=True)
-        for path in (*pictures.values(), *(self.memory / f"{name}.json" for name in names)):
-            check_writable(path)
+        pictures = [picture_in(self.plot, name) for name in names]
+        for name in names:
+            remembered_in(self.memory, name)
         found = self._measure(names)
-        for one in found:
-            if one.name in pictures:
-                with replacing(pictures[one.name]) as temporary:
-                    plot_study(one.study, one.measured, temporary)
+        for picture, one in zip(pictures, found, strict=True):
+            draw(picture, plot_study, one.study, one.measured)
         if self.json:
             print_json({one.name: [_report(row) for row in one.rows] for one in found})
         elif self.markdown:
             print("\n".join(_markdown(found)) + f"\n\n    {self._command()}")
         else:
-            _print(found, pictures)
+            _print(found, [path for path in pictures if path is not None])
         if any(row.passed is False for one in found for row in one.rows):
             sys.exit(1)
 
-    def _measure(self, names: list[str]) -> "list[Found]":
+    def _measure(self, names: list[str]) -> "list[Finished]":
         from rftsim.validation.studies import STUDIES, run
 
         request = Request(self.quick, self.data or DATA)
         total = sum(len(STUDIES[name].jobs(request)) for name in names)
-        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
-        console = Console(stderr=True)
-        with Progress(*columns, TimeElapsedColumn(), TimeRemainingColumn(), console=console, disable=self.json) as bar:
-            task = bar.add_task("validate", total=total)
-            return list(run(names, request, self.memory, lambda job: bar.update(task, advance=1, description=job)))
+        with progress("validate", total, self.json) as report:
+            return list(run(names, request, self.memory, report))
 
     def _command(self) -> str:
         return " ".join(["rftsim validate", *self.studies, *(["--quick"] if self.quick else []), "--markdown"])
@@ -110,7 +101,7 @@ def _wanted(row: Row) -> str:
 
 
 def _cells(row: Row) -> list[str]:
-    """Quantity, expected, got, error, verdict, source."""
+    """A row's cells, in the order of HEADER."""
     what = row.what + (f" [{row.unit}]" if row.unit != "-" else "")
     got = "-" if row.got is None else _number(row.got)
     error = "-" if row.error is None else f"{round(100 * row.error, 2) + 0.0:+.2f} %"
@@ -118,9 +109,10 @@ def _cells(row: Row) -> list[str]:
 
 
 HEADER = ("quantity", "expected", "got", "error", "verdict", "source")
+"""Headings of the tables."""
 
 
-def _print(found: "list[Found]", pictures: dict[str, Path]) -> None:
+def _print(found: "list[Finished]", pictures: list[Path]) -> None:
     console = Console()
     for one in found:
         table = Table(title=f"{one.name}: {escape(one.study.says)}", title_justify="left")
@@ -134,14 +126,14 @@ def _print(found: "list[Found]", pictures: dict[str, Path]) -> None:
     rows = [row for one in found for row in one.rows]
     failed = [f"{one.name}: {row.what}" for one in found for row in one.rows if row.passed is False]
     judged = sum(row.passed is not None for row in rows)
-    console.print(f"{judged - len(failed)} of {judged} rows pass", highlight=False)
+    print_line(console, f"{judged - len(failed)} of {judged} rows pass")
     for text in failed:
-        console.print(f"[bold red]FAIL[/bold red] {escape(text)}", highlight=False, soft_wrap=True)
+        print_line(console, f"[bold red]FAIL[/bold red] {escape(text)}")
     if pictures:
-        console.print(f"wrote {', '.join(map(str, pictures.values()))}", highlight=False, soft_wrap=True)
+        print_line(console, f"wrote {', '.join(map(str, pictures))}")
 
 
-def _markdown(found: "list[Found]") -> list[str]:
+def _markdown(found: "list[Finished]") -> list[str]:
     lines = [("study", *HEADER), ("---", "---", "---:", "---:", "---:", "---", "---")]
     for one in found:
         for k, row in enumerate(one.rows):

@@ -13,15 +13,17 @@ from rftsim.validation import pockets
 from rftsim.validation.pockets import Grousers, Motion, Shaded
 
 PHASES = 4
+"""Phases of the wheel, within the angle between grousers, that forces are averaged over."""
 LAW = "rft2d"
+"""The law that the grousered wheel is balanced under."""
 
 
 def steady(wheel: WheelParameters, force: Callable[[float, float], tuple[float, float]]) -> dict[str, float]:
-    """Rolling v / (R omega) and sinkage / l at which the drawbar balances the push and the load the weight.
+    """Find rolling v / (R omega) and sinkage / l at which the drawbar balances the push and the load the weight.
 
     Args:
         wheel: The wheel on its carriage.
-        force: Drawbar and load [N] at a rolling and a sinkage of the outer circle [m].
+        force: Gives drawbar and load [N] at a rolling [-] and a sinkage of the outer circle [m].
 
     Raises:
         RftsimError: There is no such state.
@@ -41,7 +43,7 @@ def steady(wheel: WheelParameters, force: Callable[[float, float], tuple[float, 
 
 
 def grousered(wheel: WheelParameters, sand: Sand, rule: str, share: float | None) -> dict[str, Any]:
-    """The same by 2D-RFT, its grousers of a share of their height, or by least power where there is none."""
+    """Find the same by 2D-RFT, the grousers having a share of their height, or by least power where it is None."""
     grousers = Grousers(wheel.radius, wheel.outer_radius, wheel.width, wheel.lugs, wheel.lug_width)
     shaded = Shaded(grousers)
     solid = None if share is None else grousers.with_height(share)

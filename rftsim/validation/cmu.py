@@ -18,44 +18,45 @@ SMOOTH_FILE: Final = "cmu_wheel_smooth.csv"
 
 
 class Runs(NamedTuple):
-    """Measured runs of a wheel, (n,) each; SI."""
+    """Measured runs of a wheel, a value for each; shape (n,) unless said."""
 
     slip: Array
+    """Slip ratio [-]."""
     angle: Array
     """Slip angle [rad]."""
     travel: Array
-    """[m/s]."""
+    """Speed of the axle [m/s]."""
     rim: Array
-    """[m/s]."""
+    """Speed of the rim [m/s]."""
     sinkage: Array
-    """Of the tips [m]."""
+    """Sinkage of the grousers' tips [m]."""
     force: Array
-    """Drawbar, side and load [N], (n, 3)."""
+    """Drawbar, side force and load [N], shape (n, 3)."""
 
     def velocity(self, run: int) -> tuple[float, float]:
-        """Of the axle along and across the wheel's heading [m/s]."""
+        """Velocity of the axle along and across the wheel's heading in a run [m/s]."""
         travel, angle = float(self.travel[run]), float(self.angle[run])
         return travel * math.cos(angle), travel * math.sin(angle)
 
 
 class PlateTest(NamedTuple):
-    """A circular plate pushed into the sand."""
+    """A test in which a circular plate is pushed into the sand."""
 
     diameter: float
-    """[m]."""
+    """Diameter of the plate [m]."""
     depth: Array
-    """(n,) [m]."""
+    """Depths at which the force was read [m], shape (n,)."""
     force: Array
-    """(n,) [N]."""
+    """Vertical force on the plate [N], shape (n,)."""
 
     @property
     def area(self) -> float:
-        """[m^2]."""
+        """Area of the plate on the sand [m^2]."""
         return math.pi / 4 * self.diameter**2
 
 
 def read_runs(path: Path) -> Runs:
-    """The runs in a wheel's file.
+    """Read the runs of a wheel from its file.
 
     Raises:
         RftsimError: The file lacks a column, or a number.
@@ -67,7 +68,7 @@ def read_runs(path: Path) -> Runs:
 
 
 def read_plates(path: Path) -> list[PlateTest]:
-    """The tests in a plates' file.
+    """Read the tests of circular plates from their file.
 
     Raises:
         RftsimError: The file lacks a column, a number, or a second size of plate.
@@ -85,5 +86,5 @@ def read_plates(path: Path) -> list[PlateTest]:
 
 
 def digest(path: Path) -> str:
-    """Of a file's content."""
+    """The first 12 hexadecimal digits of the SHA-256 of a file's content."""
     return hashlib.sha256(path.read_bytes()).hexdigest()[:12]

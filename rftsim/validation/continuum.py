@@ -20,18 +20,19 @@ from rftsim.law.rigid import surface_force
 from rftsim.sand.medium import ALPHA_Z_PLATE, Sand
 from rftsim.sand.strength import xi_n_from_table
 from rftsim.surface.triangles import Array, make_surface
-from rftsim.validation.shipped import Results, found, shipped
+from rftsim.validation.shipped import Results, outcome, shipped
 from rftsim.validation.study import Measured, Request, Row, at_most, near
 
 MAPS: Final = ("plates", "deep")
 """Campaigns of plates over their angles, near the surface and as deep as the solids."""
 RHO: Final = 3000.0
-"""Of Table C.1 and of the campaigns [kg/m^3]."""
+"""Density of the sand of Table C.1 and of the campaigns [kg/m^3]."""
 REASON: Final = "Table C.1 has contact a cell early, see the rows below"
+"""Note on the rows that are off, for a reason that other rows show."""
 
 
 def jobs(request: Request) -> dict[str, Callable[[], Any]]:
-    """One for each campaign that is there."""
+    """A job for each campaign that is there, which reads it."""
     known = shipped("flat", flat) | shipped("solids", solids)
     for name in MAPS:
         known |= shipped(name, functools.partial(plates, name))
@@ -39,13 +40,13 @@ def jobs(request: Request) -> dict[str, Callable[[], Any]]:
 
 
 def flat(results: Results) -> list[dict[str, float]]:
-    """Flat plates pushed down: mu_int, early, cells, alpha_z."""
+    """Flat plates pushed down: mu_int [-], contact early by so many cells, cells [-], and alpha_z [N/m^3] of each."""
     keys = ("mu_int", "early", "cells")
     return [{name: one["plate"][name] for name in keys} | {"alpha_z": one["alpha_N_m3"][2]} for one in results]
 
 
 def plates(name: str, _: Results) -> dict[str, Any]:
-    """3D-RFT's cubic fitted to a map, and what it and the source's table miss."""
+    """Fit 3D-RFT's cubic to a map of plates, and tell what it and the source's table miss."""
     fit = _fitted(name)
     return {
         "n": fit.plates.n,
@@ -67,7 +68,7 @@ def _fitted(name: str) -> Any:
 
 
 def solids(results: Results) -> list[dict[str, Any]]:
-    """Solids in deep sand: measured force, and that of four laws [N]."""
+    """Solids in deep sand: the continuum's force on each, and that of four laws [N]."""
     own, deep = (_fitted(name) for name in MAPS)
     laws: dict[str, tuple[Law, float]] = {
         "own": (fitted_law(own.generic.table), own.generic.xi_n),
@@ -92,13 +93,13 @@ def solids(results: Results) -> list[dict[str, Any]]:
 
 
 def _by_cells(solids: list[dict[str, Any]]) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
-    """Those in the cells that most have, and those in finer ones."""
+    """Divide solids into those in the coarsest cells, and those in finer ones."""
     coarse = max(one["dx"] for one in solids)
     return [one for one in solids if one["dx"] == coarse], [one for one in solids if one["dx"] < coarse]
 
 
 def missed(solids: list[dict[str, Any]], law: str) -> dict[str, list[float]]:
-    """|F - F'| over the largest |F| of the shape, by shape."""
+    """A law's error |F - F'| of each solid over the largest |F| of its shape [-], by shape."""
     off: dict[str, list[float]] = {}
     for shape in dict.fromkeys(one["shape"] for one in solids):
         own = [one for one in solids if one["shape"] == shape]
@@ -108,17 +109,17 @@ def missed(solids: list[dict[str, Any]], law: str) -> dict[str, list[float]]:
 
 
 def rows(measured: Measured) -> list[Row]:
-    """What the source's tables are against the continuum, and what a fit to the continuum is."""
-    table = _flat_rows(found(measured, "flat") or [])
+    """The rows of the source's tables against the continuum, and of fits to the continuum."""
+    table = _flat_rows(outcome(measured, "flat") or [])
     for name in MAPS:
-        if one := found(measured, name):
+        if one := outcome(measured, name):
             what = f"{one['n']} plates {one['depth']:.1f} L deep"
             table += [
                 Row(f"{what}: error of Table C.3, scaled", 100 * one["source"], "our continuum", unit="%"),
                 at_most(f"{what}: of our cubic, held back", 100 * one["held_back"], 10.0, "our continuum", unit="%"),
                 at_most(f"{what}: largest power α·v over ξ_n", one["power"], 0.0, "dissipative by constraint"),
             ]
-    if pushed := found(measured, "solids"):
+    if pushed := outcome(measured, "solids"):
         table += _solid_rows(*_by_cells(pushed))
     return table
 
@@ -155,7 +156,7 @@ def _solid_rows(solids: list[dict[str, Any]], finer: list[dict[str, Any]]) -> li
 
 
 def _alpha(flats: list[dict[str, float]], mu: float, early: float) -> tuple[Array, Array]:
-    """Cells and alpha_z, from coarse to fine."""
+    """Cells [-] and alpha_z [N/m^3] of the flat plates with a friction and a contact, from coarse to fine."""
     own = sorted((one["cells"], one["alpha_z"]) for one in flats if (one["mu_int"], one["early"]) == (mu, early))
     cells, alpha = np.array(own).T
     return cells, alpha
@@ -185,12 +186,12 @@ def _flat_rows(flats: list[dict[str, float]]) -> list[Row]:
 
 
 def draw(measured: Measured, figure: Any) -> None:
-    """Flat plates over cell size, the map, and the solids: predicted over measured."""
-    pushed = found(measured, "solids")
+    """Draw flat plates over the size of cells, and predicted over measured: the map of plates, and the solids."""
+    pushed = outcome(measured, "solids")
     axes = figure.subplots(1, 3 if pushed else 2)
-    if flats := found(measured, "flat"):
+    if flats := outcome(measured, "flat"):
         _draw_flat(axes[0], flats)
-    if one := found(measured, "plates"):
+    if one := outcome(measured, "plates"):
         for k, name in enumerate("xyz"):
             axes[1].plot(
                 np.array(one["measured"])[:, k], np.array(one["predicted"])[:, k], ".", label=f"$\\alpha_{name}$"

@@ -14,22 +14,23 @@ from rftsim.surface.triangles import Array, Surface, make_surface
 from rftsim.validation.study import Measured, Request, Row, at_most, near
 
 RADIUS, LENGTH = 0.025, 0.14
+"""Radius and length of both cylinders [m]."""
 EDGE: Final = 0.0025
-"""Of the triangles of the DEM's cylinder: finer than the cut-off, without which no edge is seen [m]."""
+"""Edge of the triangles of the DEM's cylinder [m]: finer than the cut-off, without which no edge is seen."""
 DEPTHS: Final = (0.0, 0.02, 0.04, 0.06, 0.08, 0.1, 0.12)
-"""Of the lower end [m]."""
+"""Depths of the lower end at which the drill is evaluated [m]."""
 DEM_DEPTH: Final = 0.1
-"""Where [Agarwal] Fig. 5-9 C looks at the stress [m]."""
+"""Depth of the lower end at which [Agarwal] Fig. 5-9 C shows the stress [m]."""
 SINKING: Final = (0.0, 0.0, -0.1)
-"""[m/s]."""
+"""Velocity of both cylinders [m/s]."""
 TURNING: Final = (0.0, 0.0, -4 * np.pi)
-"""Of the DEM's drill [rad/s]."""
+"""Angular velocity of the DEM's drill [rad/s]."""
 CUT_OFF: Final = 0.0048
 """Smallest radius of curvature that the sand resists, [Agarwal] Fig. C-6 [m]; three grain radii."""
 
 
 def lying() -> Surface:
-    """The cylinder of the other program, its axis along y."""
+    """Make the cylinder of the other program, its axis along y."""
     import trimesh  # not before it is needed: it takes a second
 
     mesh = trimesh.creation.cylinder(radius=RADIUS, height=LENGTH, sections=24)
@@ -37,7 +38,7 @@ def lying() -> Surface:
 
 
 def upright(edge: float = EDGE) -> Surface:
-    """The cylinder of the DEM, its axis along z and its lower end at the origin."""
+    """Make the cylinder of the DEM, its axis along z and its lower end at the origin, of triangles of an edge [m]."""
     angle = np.linspace(0.0, 2 * np.pi, round(2 * np.pi * RADIUS / edge), endpoint=False)
     circle = RADIUS * np.column_stack([np.cos(angle), np.sin(angle)])
     solid = extruded(circle, LENGTH, rings=round(RADIUS / edge), strips=round(LENGTH / edge))
@@ -46,7 +47,7 @@ def upright(edge: float = EDGE) -> Surface:
 
 
 def curvature_radius(surface: Surface) -> Array:
-    """Smallest radius of curvature at each triangle's corners [m], (ntri, 3), [Agarwal] section C.7.
+    """Smallest radius of curvature at each triangle's corners [m], shape (ntri, 3), [Agarwal] section C.7.
 
     Discrete principal curvatures H ± (H² - K)^1/2, with the mean curvature H by the cotangent formula and Gauss's K by
     the angle deficit, each over a third of the area of the triangles around.
@@ -70,18 +71,19 @@ def curvature_radius(surface: Surface) -> Array:
 
 
 def _welded(surface: Surface) -> tuple[Array, Any]:
+    """Corners that triangles share, (n, 3) [m], and their indices in each triangle, (ntri, 3)."""
     points = surface.triangles.reshape(-1, 3)
     _, first, inverse = np.unique(np.round(points / 1e-9), axis=0, return_index=True, return_inverse=True)
     return points[first], inverse.reshape(-1, 3)
 
 
 def jobs(request: Request) -> dict[str, Callable[[], Any]]:
-    """The other program's numbers, and the drill of the DEM over its depth."""
+    """Jobs for the other program's cylinder, and for the drill of the DEM over its depth."""
     return {"program": program, "drill": drill}
 
 
 def program() -> dict[str, float]:
-    """Of the lying cylinder, its centre at 100 mm."""
+    """Vertical force [N] and moment [N m] on the lying cylinder, its centre at 100 mm."""
     sand = Sand(xi_n=xi_n_cubic(1310, 0.21), mu_surf=0.4)
     found = surface_force(lying(), sand, position=(0, 0, -0.1), velocity=SINKING, angular_velocity=(0, 0, -np.pi))
     return {"force": float(found.force[2]), "moment": float(found.moment[2])}
@@ -93,7 +95,7 @@ def _drilled(depth: float, edge: float = EDGE) -> SurfaceForce:
 
 
 def drill() -> dict[str, Any]:
-    """Force, moment and stress of the DEM's drill, with and without the triangles that are too sharp."""
+    """Force [N] and moment [N m] on the DEM's drill over its depth, and the share left without sharp triangles."""
     states = [_drilled(depth) for depth in DEPTHS]
     at = _drilled(DEM_DEPTH)
     return {
@@ -107,7 +109,7 @@ def drill() -> dict[str, Any]:
 
 
 def _filtered(edge: float) -> float:
-    """Share of the vertical force that is left when the sand does not resist what is too sharp."""
+    """Share of the vertical force [-] that is left when the sand does not resist what is too sharp."""
     surface, state = upright(edge), _drilled(DEM_DEPTH, edge)
     kept = _is_round(surface)
     return float(state.stress[kept, 2] @ surface.areas[kept] / state.force[2])
@@ -118,7 +120,7 @@ def _is_round(surface: Surface) -> Any:
 
 
 def rows(measured: Measured) -> list[Row]:
-    """An independent program's numbers; those of the DEM are not printed in the thesis."""
+    """The rows of an independent program's numbers; those of the DEM are not printed in the thesis."""
     other, at = measured["program"], measured["drill"]["at"]
     source = "independent program"
     figure = "[Agarwal] Fig. 5-9: a figure only, no number printed"
@@ -137,7 +139,7 @@ def rows(measured: Measured) -> list[Row]:
 
 
 def draw(measured: Measured, figure: Any) -> None:
-    """Force and moment over depth, and the stress on each triangle."""
+    """Draw force and moment over depth, and the stress on each triangle."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import PowerNorm
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection

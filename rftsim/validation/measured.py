@@ -22,34 +22,44 @@ from rftsim.validation.study import Measured, Request, Row, at_least, at_most, n
 from rftsim.validation.terramechanics import Soil
 
 WHEEL: Final = Grousers(hub=0.0575, tip=0.0625, width=0.060, number=24, thickness=0.002)
-"""The thickness of the grousers is not published; 1 to 3 mm change an RMSE by less than 0.2 N."""
+"""The measured wheel; its grousers' thickness is not published: 1 to 3 mm change an RMSE by less than 0.2 N."""
 SAND: Final = Sand(rho_c=1330.0, mu_int=math.tan(math.radians(29)), mu_surf=0.35)
-"""Strength from Table C.1."""
+"""The sand of the measurements, its strength from Table C.1."""
 CUBIC: Final = xi_n_cubic(1330.0, math.tan(math.radians(29))) / float(SAND.xi_n or math.nan)
-"""Strength by the cubic of Fig. C-2 over that of Table C.1."""
+"""Strength by the cubic of Fig. C-2 over that of Table C.1 [-]."""
 PHASES: Final = 4
+"""Phases of the wheel, within the angle between grousers, that forces are averaged over."""
 MOST_SLIP, MOST_ANGLE_DEG = 0.55, 60.0
+"""Largest slip [-] and slip angle [deg] of the runs that are compared."""
 FORCES: Final = ("drawbar", "side", "load")
+"""Components of the force, in the order of the data."""
 SHARES: Final = {"full grousers": 1.0, "one third": 1.0 / 3.0, "no grousers": 0.0}
+"""Shares of their height that grousers keep, by rule."""
 KNOWN: Final = {
     "full grousers": (6.0, 2.7, 6.2),
     "one third": (2.4, 3.7, 6.3),
     "no grousers": (3.2, 4.3, 6.7),
 }
-"""RMSE of another implementation of 3D-RFT with the cubic strength [N]."""
+"""RMSE of each force by another implementation of 3D-RFT with the cubic strength [N], by rule."""
 LEAST, SMOOTH = "least power", "smooth wheel"
+"""The rule by which each pocket is cheapest, and the wheel that has no grousers."""
 LITERATURE, OWN = "terramechanics, dry sand", "terramechanics, the plates"
+"""The rules of terramechanics: with a soil of the literature, and with that of the plates."""
 SOILS: Final = {
     LITERATURE: "Wong-Reece; dry sand of [Wong2008]",
     OWN: "Wong-Reece; n, k_c, k_φ of the plates, φ 29°, K 25 mm [Wong2008]",
 }
+"""Sources of the soils' numbers, by rule."""
+COLOURS: Final = dict(zip((*SHARES, LEAST, *SOILS), ("C3", "C0", "0.6", "C2", "C1", "C4"), strict=True))
+"""Colour of each rule."""
 ABSENT: Final = "data not here"
+"""Words for data that are missing."""
 DATA: Final = Path("../shared/data/cmu")
-"""Where the data are looked for."""
+"""Folder in which the data are looked for."""
 
 
 def jobs(request: Request) -> dict[str, Callable[[], Any]]:
-    """Every rule on every run, and the plates; what has no data says so."""
+    """A job for each rule on all runs, and for the plates; none where the data are missing."""
     found: dict[str, Callable[[], Any]] = {}
     wheel, plates = request.data / WHEEL_FILE, request.data / PLATE_FILE
     if wheel.is_file():
@@ -70,7 +80,7 @@ def jobs(request: Request) -> dict[str, Callable[[], Any]]:
 
 
 def by_force_law(rule: str, wheel: Path) -> dict[str, Any]:
-    """Forces of every run that is judged, by 3D-RFT and a rule for the grousers; [N], (n, 3)."""
+    """Forces of every run that is compared [N], (n, 3), by 3D-RFT and a rule for the grousers."""
     runs = read_runs(wheel)
     shaded = Shaded(WHEEL)
     solid = WHEEL.disc() if rule == SMOOTH else WHEEL.with_height(SHARES[rule]) if rule in SHARES else None
@@ -90,7 +100,7 @@ def by_force_law(rule: str, wheel: Path) -> dict[str, Any]:
 
 
 def by_terramechanics(soil: Soil, wheel: Path) -> dict[str, Any]:
-    """The same by terramechanics, under the measured load, and the sinkage [m]."""
+    """Forces of the same runs [N], (n, 3), by terramechanics under the measured load, and the sinkage [m]."""
     runs = read_runs(wheel)
     found, sunk = [], []
     for k in np.flatnonzero(_judged(runs)):
@@ -104,11 +114,12 @@ def by_terramechanics(soil: Soil, wheel: Path) -> dict[str, Any]:
 
 
 def _judged(runs: Runs) -> Any:
-    """Runs that are compared: moderate slips and slip angles."""
+    """Whether each run is compared, (n,): those of moderate slips and slip angles are."""
     return (np.abs(runs.slip) <= MOST_SLIP) & (runs.angle <= math.radians(MOST_ANGLE_DEG + 1e-6))
 
 
 def _compared(runs: Runs) -> dict[str, Any]:
+    """The measured forces [N], sinkages [m], slips [-] and slip angles of the runs that are compared."""
     judged = _judged(runs)
     return {
         "measured": runs.force[judged].tolist(),
@@ -119,7 +130,7 @@ def _compared(runs: Runs) -> dict[str, Any]:
 
 
 def plate_stiffness(path: Path) -> dict[str, list[float]]:
-    """Stress over depth of each plate test, through the origin [N/m^3], by diameter in mm."""
+    """Stress over depth of each test of a plate, through the origin [N/m^3], by diameter in mm."""
     found: dict[str, list[float]] = {}
     for test in read_plates(path):
         slope = float(test.depth @ test.force / (test.depth @ test.depth))
@@ -128,7 +139,7 @@ def plate_stiffness(path: Path) -> dict[str, list[float]]:
 
 
 def soil_of_plates(path: Path) -> Soil:
-    """Bekker's soil from the plates in the same sand, [Agarwal] eq. (1.4).
+    """Fit Bekker's soil to the plates in the same sand, [Agarwal] eq. (1.4).
 
     ln p = ln(k_c / b + k_phi) + n ln z by least squares, b the plate's radius, less than 5 mm of depth left out.
     """
@@ -154,21 +165,23 @@ def soil_of_plates(path: Path) -> Soil:
 
 
 def _by_rule(measured: Measured, wheel: str = "wheel") -> dict[str, dict[str, Any]]:
+    """The measurements of a wheel, by rule."""
     return {name.partition("/")[2]: value for name, value in measured.items() if name.startswith(f"{wheel} ")}
 
 
 def _plates(measured: Measured) -> dict[str, list[float]] | None:
+    """The stiffness of the plates, as `plate_stiffness` gives it; None where there are no data."""
     return next((value for name, value in measured.items() if name.startswith("plates ")), None)
 
 
 def rmse(found: dict[str, Any], factor: float = 1.0) -> dict[str, float]:
-    """Root of the mean square error of each force [N], with the prediction times a factor."""
+    """Root of the mean square error of each force [N], the prediction taken times a factor."""
     error = factor * np.array(found["force"]) - np.array(found["measured"])
     return dict(zip(FORCES, np.sqrt((error**2).mean(axis=0)).tolist(), strict=True))
 
 
 def rows(measured: Measured) -> list[Row]:
-    """The wheel by each rule, and the plates."""
+    """The rows of the wheel by each rule, and those of the plates."""
     smooth = [
         Row(f"{SMOOTH}: {name} RMSE", value, "measured; ξ_n by Table C.1", unit="N", note="radius taken as 62.5 mm")
         for found in _by_rule(measured, "smooth").values()
@@ -226,7 +239,7 @@ def _plate_rows(found: dict[str, list[float]] | None) -> list[Row]:
 
 
 def draw(measured: Measured, figure: Any) -> None:
-    """Forces over slip at each slip angle, measured and by rule; and the RMSE."""
+    """Draw forces over slip at each slip angle, measured and by rule, with the RMSE of each rule."""
     found = _by_rule(measured)
     if not found:
         figure.text(0.5, 0.5, f"{ABSENT}: --data DIR", ha="center")
@@ -234,25 +247,12 @@ def draw(measured: Measured, figure: Any) -> None:
     some = next(iter(found.values()))
     angles = sorted(set(np.round(some["angle_deg"], 6)))
     panels = figure.subplots(3, len(angles), sharex=True, sharey="row")
-    colours = dict(zip((*SHARES, LEAST, *SOILS), ("C3", "C0", "0.6", "C2", "C1", "C4"), strict=True))
     for column, angle in enumerate(angles):
         own = np.isclose(some["angle_deg"], angle)
-        slip = np.array(some["slip"])[own]
-        steps = np.unique(np.round(slip, 1))
-        groups = [np.isclose(np.round(slip, 1), step) for step in steps]
         for row, name in enumerate(FORCES):
             axis = panels[row, column]
-            for rule, predicted in found.items():
-                if rule in SOILS and name == "load":
-                    continue
-                values = np.array(predicted["force"])[own, row]
-                each = rmse(predicted).values()
-                numbers = " / ".join(f"{v:.1f}" for v in list(each)[: 2 if rule in SOILS else 3])
-                line = "--" if rule in SOILS else "-"
-                label = f"{rule}{', load given' if rule in SOILS else ''}: {numbers} N"
-                points = [slip[group].mean() for group in groups], [values[group].mean() for group in groups]
-                axis.plot(*points, line, color=colours[rule], linewidth=1.4, label=label)
-            axis.plot(slip, np.array(some["measured"])[own, row], "k.", label="measured")
+            _draw_rules(axis, found, own, row)
+            axis.plot(np.array(some["slip"])[own], np.array(some["measured"])[own, row], "k.", label="measured")
             axis.grid(alpha=0.3)
             if column == 0:
                 axis.set_ylabel(f"{name} [N]")
@@ -260,3 +260,23 @@ def draw(measured: Measured, figure: Any) -> None:
         panels[2, column].set_xlabel("slip [-]")
     figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
     figure.suptitle("Grousered wheel in sand, nothing fitted to it; RMSE of drawbar / side force / load")
+
+
+def _draw_rules(axis: Any, found: dict[str, dict[str, Any]], own: Any, component: int) -> None:
+    """Draw one component of the force by every rule over the slip of some runs, averaged over runs of like slip."""
+    for rule, predicted in found.items():
+        if rule in SOILS and FORCES[component] == "load":
+            continue
+        slip, values = np.array(predicted["slip"])[own], np.array(predicted["force"])[own, component]
+        rounded = np.round(slip, 1)
+        groups = [np.isclose(rounded, step) for step in np.unique(rounded)]
+        points = [slip[group].mean() for group in groups], [values[group].mean() for group in groups]
+        line = "--" if rule in SOILS else "-"
+        axis.plot(*points, line, color=COLOURS[rule], linewidth=1.4, label=_label(rule, predicted))
+
+
+def _label(rule: str, predicted: dict[str, Any]) -> str:
+    """A rule's name with its RMSE [N], of the forces that it predicts."""
+    given = rule in SOILS
+    errors = list(rmse(predicted).values())[: 2 if given else 3]
+    return f"{rule}{', load given' if given else ''}: {' / '.join(f'{error:.1f}' for error in errors)} N"

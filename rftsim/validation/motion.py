@@ -11,11 +11,11 @@ import numpy as np
 
 from rftsim.run.rates import measure
 from rftsim.validation.plates import fit_terms
-from rftsim.validation.shipped import Results, found, shipped
+from rftsim.validation.shipped import Results, outcome, shipped
 from rftsim.validation.study import Measured, Request, Row, at_least, near
 
 RATES: Final = {"grouser-wheel": (10.0, 30.0, 60.0, 90.0), "four-flap-runner": (60.0, 100.0, 300.0)}
-"""Of the shipped wheels, by scene [1/min]."""
+"""Rates of the shipped wheels, by scene [1/min]."""
 DRAG: Final = (580.0, 1.1)
 """K [N/m^2] and lambda of [Agarwal] section 4.7."""
 TRENDS: Final = (
@@ -23,13 +23,13 @@ TRENDS: Final = (
     ("the wheel's sinkage at 90 over at 10 RPM", "grouser-wheel", "sinkage", 90.0, 10.0, "[Agarwal] Fig. 4-7"),
     ("the runner's sinkage at 100 over at 300 RPM", "four-flap-runner", "sinkage", 100.0, 300.0, "[Agarwal] Fig. 4-9"),
 )
-"""Of two rates, that of the first over that of the second is more than one: what, scene, quantity, rates, source."""
+"""Ratios of a quantity at two rates that exceed one: description, scene, quantity, upper and lower rate, source."""
 UNSTEADY: Final = 0.05
-"""A change of the speed over the means' time that a reader is told of [-]."""
+"""Relative change of the speed, over the time of the means, from which on a reader is told of it [-]."""
 
 
 def jobs(request: Request) -> dict[str, Callable[[], Any]]:
-    """What is shipped, and the law at the same rates."""
+    """Jobs that read what is shipped, and jobs that step the law at the same rates."""
     laws = {
         f"{scene}/drft2d/{rpm:g}": functools.partial(_law, scene, rpm) for scene, own in RATES.items() for rpm in own
     }
@@ -66,12 +66,12 @@ def _wheels(results: Results) -> list[dict[str, Any]]:
 
 
 def rows(measured: Measured) -> list[Row]:
-    """The continuum against the source's fits, and the law against the continuum."""
-    return [*_plate_rows(found(measured, "rates") or []), *_wheel_rows(measured, found(measured, "wheels") or [])]
+    """The rows of the continuum against the source's fits, and of the law against the continuum."""
+    return [*_plate_rows(outcome(measured, "rates") or []), *_wheel_rows(measured, outcome(measured, "wheels") or [])]
 
 
 def _fit(plates: list[dict[str, float]]) -> tuple[float, float]:
-    """K and lambda of F = K z + lambda rho L v^2."""
+    """Fit K [N/m^2] and lambda [-] of F = K z + lambda rho L v^2."""
     rho, length, speed, depth, force = (
         np.array([one[name] for one in plates]) for name in ("rho", "length", "speed", "depth", "force")
     )
@@ -111,9 +111,9 @@ def _wheel_rows(measured: Measured, wheels: list[dict[str, Any]]) -> list[Row]:
 
 
 def draw(measured: Measured, figure: Any) -> None:
-    """Drag over speed, and rolling and sinkage of both wheels over their rate."""
+    """Draw drag over speed, and rolling and sinkage of both wheels over their rate."""
     left, middle, right = figure.subplots(1, 3)
-    dragged = found(measured, "rates") or []
+    dragged = outcome(measured, "rates") or []
     for travel, fill in zip(sorted({one["buried"] for one in dragged}), ("none", "full"), strict=False):
         for k, depth in enumerate(sorted({one["depth"] for one in dragged})):
             some = sorted((o["speed"], o["force"]) for o in dragged if (o["buried"], o["depth"]) == (travel, depth))
@@ -125,7 +125,7 @@ def draw(measured: Measured, figure: Any) -> None:
         left.plot(v, DRAG[0] * depth + DRAG[1] * unit * v**2, "--", color=f"C{k}", label=said)
     left.set_xlabel("speed [m/s]")
     left.set_ylabel("drag per width [N/m]")
-    wheels = found(measured, "wheels") or []
+    wheels = outcome(measured, "wheels") or []
     for k, scene in enumerate(RATES):
         own = [one for one in wheels if one["scene"] == scene]
         rpm = [one["rpm"] for one in own]

@@ -16,33 +16,44 @@ from rftsim.surface.triangles import Array, Surface
 from rftsim.validation.study import Measured, Request, Row, near
 
 DRAG_DEPTHS: Final = (0.02, 0.03, 0.04)
+"""Depths of the dragged plate's centre [m]."""
 DRAG_SPEEDS: Final = (1e-6, 0.04, 0.1, 0.2, 0.32, 0.48, 0.64)
+"""Speeds of the dragged plate [m/s]."""
 DRAG_LENGTH: Final = 0.016
+"""Height of the dragged plate [m]."""
 DRAG_SAND: Final = Sand(rho_c=900.0, lambda_=1.1, zeta=1.0)
+"""Sand of the dragged plate, but for its strength."""
 K_DRAG: Final = 580.0
 """Static drag over depth, per metre of width [N/m^2]."""
 DRAG_FORCES: Final = {0.02: 11.6, 0.03: 17.4, 0.04: 23.2}
-"""[Agarwal] section 4.7: K |z| by depth [N/m]."""
+"""Static drag K |z| by depth, per metre of width, [Agarwal] section 4.7 [N/m]."""
 DRAG_INERTIA: Final = 6.5
-"""The same: added at 0.64 m/s [N/m]."""
+"""Drag that is added at 0.64 m/s, per metre of width, [Agarwal] section 4.7 [N/m]."""
 
 PUSH_LENGTH, PUSH_DEPTH = 0.16, 0.16
+"""Length and depth of the plate that is pushed down [m]."""
 PUSH_SPEEDS: Final = (1e-6, 0.5, 1.0, 2.0, 3.0)
+"""Speeds of the plate that is pushed down [m/s]."""
 PUSH_SAND: Final = Sand(rho_c=2500.0, mu_int=0.62, lambda_=2.8)
+"""Sand of the plate that is pushed down."""
 
 OBLIQUE_ANGLES_DEG: Final = (15, 30, 45, 60, 75, 90)
+"""Angles between the oblique plates and their velocity [deg]."""
 OBLIQUE_SPEEDS: Final = (1e-6, 0.05, 0.25, 0.5, 0.75)
+"""Speeds of the oblique plates [m/s]."""
 OBLIQUE_LENGTH, OBLIQUE_DEPTH = 0.03, 0.012
+"""Width and submerged height of the oblique plates [m]."""
 OBLIQUE_SAND: Final = Sand(rho_c=1450.0, mu_int=0.4, mu_surf=0.4, lambda_=1.1)
+"""Sand of the oblique plates."""
 
 
 def face(normal: Array, length: float, width: float) -> Surface:
-    """The leading face of a thin plate about the origin, `width` across y where it can be; [m].
+    """Make the leading face of a thin plate about the origin, `width` across y where it can be.
 
     Args:
-        normal: Outward, (3,).
-        length: Along the other direction.
-        width: Along the horizontal direction in the plate.
+        normal: Its outward unit normal, shape (3,).
+        length: Its extent in the other direction [m].
+        width: Its extent along the horizontal direction in the plate [m].
     """
     across = np.array([-normal[1], normal[0], 0.0]) if abs(normal[2]) < 0.9 else np.array([0.0, 1.0, 0.0])
     across = across / np.linalg.norm(across)
@@ -53,12 +64,12 @@ def face(normal: Array, length: float, width: float) -> Surface:
 
 
 def jobs(request: Request) -> dict[str, Callable[[], Any]]:
-    """Three kinds of plates."""
+    """Jobs for plates that are dragged, pushed down and oblique."""
     return {"drag": drag, "push": push, "oblique": functools.partial(oblique, OBLIQUE_ANGLES_DEG)}
 
 
 def drag() -> dict[str, Any]:
-    """Drag per metre of width on an upright plate over depth and speed, DRFT."""
+    """Drag per metre of width [N/m] on an upright plate over depth and speed, by DRFT."""
     plate = face(np.array([1.0, 0.0, 0.0]), DRAG_LENGTH, 1.0)
 
     def force(sand: Sand, depth: float, speed: float) -> float:
@@ -74,7 +85,7 @@ def drag() -> dict[str, Any]:
 
 
 def push() -> dict[str, Any]:
-    """Force per metre of width on a flat plate pushed straight down, over speed, DRFT; strength from Table C.1."""
+    """Force per metre of width [N/m] on a flat plate pushed straight down, over speed, by DRFT."""
     plate = face(np.array([0.0, 0.0, -1.0]), PUSH_LENGTH, 1.0)
     found = []
     for speed in PUSH_SPEEDS:
@@ -86,7 +97,7 @@ def push() -> dict[str, Any]:
 
 
 def oblique(angles_deg: tuple[int, ...]) -> dict[str, Any]:
-    """Normal force on an upright plate, its lower edge at the depth, turned to its velocity; 3D-DRFT."""
+    """Normal force [N] on an upright plate, its lower edge at the depth, turned to its velocity, by 3D-DRFT."""
     found, inertia = [], []
     for angle in np.radians(angles_deg):
         normal = np.array([np.sin(angle), np.cos(angle), 0.0])
@@ -105,14 +116,14 @@ def oblique(angles_deg: tuple[int, ...]) -> dict[str, Any]:
 
 
 def fit_terms(static: Array, dynamic: Array, force: Array) -> tuple[float, float]:
-    """Factors of two terms of a force by least squares."""
+    """Fit the factors of the static and the dynamic term of a force by least squares."""
     basis = np.column_stack([static.ravel(), dynamic.ravel()])
     (first, second), *_ = np.linalg.lstsq(basis, force.ravel(), rcond=None)
     return float(first), float(second)
 
 
 def rows(measured: Measured) -> list[Row]:
-    """The terms that go in come out."""
+    """The rows of the terms that go in, and must come out."""
     found = []
     dragged, pushed, oblique = (measured[name] for name in ("drag", "push", "oblique"))
     published, own = "[Agarwal] section 4.7", "what the law was given: exact"
@@ -139,7 +150,7 @@ def rows(measured: Measured) -> list[Row]:
 
 
 def draw(measured: Measured, figure: Any) -> None:
-    """Force over speed of the three kinds, with the published line where there is one."""
+    """Draw force over speed of the three kinds, with the published line where there is one."""
     left, middle, right = figure.subplots(1, 3)
     dragged, pushed, oblique = (measured[name] for name in ("drag", "push", "oblique"))
     v = np.linspace(0.0, 0.64, 50)

@@ -20,37 +20,44 @@ from rftsim.sand.medium import Sand
 from rftsim.surface.triangles import Array, Surface, make_surface
 
 STRIPS, RINGS = 4, 6
+"""Strips across the rim and rings on the sides of the wheel's mesh."""
 
 
 class Solid(NamedTuple):
     """A surface, and its form for repeated evaluation."""
 
     surface: Surface
+    """Its triangles."""
     numbers: Array
+    """The same, packed for evaluation."""
 
 
 class Grousers(NamedTuple):
     """A grousered wheel about the y axis; lengths in metres."""
 
     hub: float
+    """Radius of the hub [m]."""
     tip: float
+    """Radius of the grousers' tips [m]."""
     width: float
+    """Width of the wheel [m]."""
     number: int
+    """Number of grousers."""
     thickness: float
-    """Of a grouser along the rim."""
+    """Thickness of a grouser along the rim [m]."""
 
     @property
     def pitch(self) -> float:
-        """Angle between grousers."""
+        """Angle between one grouser and the next [rad]."""
         return 2 * np.pi / self.number
 
     def with_height(self, share: float) -> Solid:
-        """The wheel with grousers of a share of their height."""
+        """Make the wheel with grousers of a share of their height."""
         height = share * (self.tip - self.hub)
         return self._extruded(self.hub, height)
 
     def disc(self) -> Solid:
-        """The disc of the tips' circle."""
+        """Make the disc whose rim is the circle of the tips."""
         return self._extruded(self.tip, 0.0)
 
     def _extruded(self, radius: float, height: float) -> Solid:
@@ -59,22 +66,22 @@ class Grousers(NamedTuple):
         return Solid(surface, layout.pack_surface(surface))
 
     def pocket_of(self, surface: Surface) -> Any:
-        """Which pocket each triangle belongs to: from the middle of one grouser to that of the next."""
+        """Number of the pocket that each triangle belongs to, from the middle of one grouser to the next, (ntri,)."""
         angle = np.arctan2(surface.centres[:, 2], surface.centres[:, 0])
         return np.floor(angle / self.pitch).astype(int) % self.number
 
 
 class Motion(NamedTuple):
-    """Pose and motion of a wheel."""
+    """Pose and motion of a wheel whose axle is parallel to y."""
 
     height: float
-    """Of the axle above the sand [m]."""
+    """Height of the axle above the sand [m]."""
     phase: float
-    """Angle turned [rad]."""
+    """Angle that the wheel has turned about y [rad]."""
     velocity: Array
-    """(3,) [m/s]."""
+    """Velocity of the axle [m/s], shape (3,)."""
     rate: float
-    """About y [rad/s]."""
+    """Angular velocity about y [rad/s]."""
 
 
 class Shaded:
@@ -85,7 +92,7 @@ class Shaded:
         self.flowing, self.carried = wheel.with_height(1.0), wheel.disc()
 
     def force(self, sand: Sand, motion: Motion, law: str) -> Array:
-        """Of the sand on the wheel [N], (3,)."""
+        """Force of the sand on the wheel under a law [N], shape (3,)."""
         flowing, flowing_power = self._by_pocket(self.flowing, sand, sand, motion, law)
         carried, carried_power = self._by_pocket(self.carried, sand, _on_itself(sand), motion, law)
         flows = flowing_power >= carried_power  # the sand's power is negative
@@ -93,7 +100,7 @@ class Shaded:
         return total
 
     def _by_pocket(self, solid: Solid, sand: Sand, rim: Sand, motion: Motion, law: str) -> tuple[Array, Array]:
-        """Force [N] and power [W] of each pocket, (count, 3) and (count,), with its own friction at the rim."""
+        """Force [N] and power [W] on each pocket, (number, 3) and (number,); at the rim by the friction of `rim`."""
         surface, count = solid.surface, self.wheel.number
         loads, velocity = _loads(solid, sand, motion, law)
         if rim is not sand:
@@ -108,13 +115,13 @@ class Shaded:
 
 
 def force(solid: Solid, sand: Sand, motion: Motion, law: str) -> Array:
-    """Force on a solid as it is [N], (3,)."""
+    """Force of the sand on a solid as it is [N], shape (3,)."""
     total: Array = _loads(solid, sand, motion, law)[0].sum(axis=0)
     return total
 
 
 def _on_itself(sand: Sand) -> Sand:
-    """The sand where it shears on itself."""
+    """Make the sand whose friction with a surface is that with itself."""
     assert sand.mu_int is not None, "the pockets need the sand's internal friction"
     return sand.replace(mu_surf=sand.mu_int)
 

@@ -8,14 +8,17 @@ from rftsim.run.rates import measure
 from rftsim.validation.study import Measured, Request, Row, at_least, near
 
 RATES: Final = (20.0, 40.0, 60.0, 80.0, 100.0, 150.0, 200.0, 250.0, 300.0)
+"""Imposed rates [1/min]."""
 QUICK_RATES: Final = (60.0, 100.0, 300.0)
+"""Imposed rates where fewer will do [1/min]."""
 LAMBDAS: Final = (0.0, 2.0, 4.0)
+"""Inertial factors lambda [-]."""
 EXPECTED: Final = {0.0: {100.0: 0.279, 300.0: 0.247}, 4.0: {100.0: 0.269, 300.0: 0.204}}
-"""Sinkage over l of an independent program, by lambda and rate."""
+"""Sinkage over l of an independent program [-], by lambda and rate [1/min]."""
 
 
 def jobs(request: Request) -> dict[str, Callable[[], Any]]:
-    """Every lambda and rate."""
+    """A job for every lambda and every rate."""
     lambdas, rates = (tuple(EXPECTED), QUICK_RATES) if request.quick else (LAMBDAS, RATES)
     return {f"{lambda_:g}/{rpm:g}": functools.partial(_point, lambda_, rpm) for lambda_ in lambdas for rpm in rates}
 
@@ -26,12 +29,12 @@ def _point(lambda_: float, rpm: float) -> dict[str, Any]:
 
 
 def _curve(measured: Measured, lambda_: float) -> dict[float, dict[str, Any]]:
-    """By rate."""
+    """The points of a lambda in the order of their rate, by rate [1/min]."""
     return {p["rpm"]: p for p in sorted(measured.values(), key=lambda p: float(p["rpm"])) if p["lambda"] == lambda_}
 
 
 def rows(measured: Measured) -> list[Row]:
-    """An independent program's sinkage, and the turnover."""
+    """The rows of an independent program's sinkage, and of the turnover."""
     found = []
     for lambda_, expected in EXPECTED.items():
         own = _curve(measured, lambda_)
@@ -54,7 +57,7 @@ def rows(measured: Measured) -> list[Row]:
 
 
 def draw(measured: Measured, figure: Any) -> None:
-    """Rolling and sinkage over spin, dimensionless as in [Agarwal] Fig. 4-9."""
+    """Draw rolling and sinkage over spin, dimensionless as in [Agarwal] Fig. 4-9."""
     left, right = figure.subplots(1, 2)
     spin_of: dict[float, float] = {}
     for k, lambda_ in enumerate(dict.fromkeys(point["lambda"] for point in measured.values())):

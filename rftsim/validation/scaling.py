@@ -20,28 +20,39 @@ from rftsim.surface.triangles import Wheel
 from rftsim.validation.study import Measured, Request, Row, at_most
 
 TIMESTEP: Final = 5e-4
+"""Time step of the unscaled cases [s]."""
 TURNS: Final = 4.0
+"""Turns that the means are over."""
 NAMES: Final = ("speed", "sinkage", "power")
+"""Quantities that are compared."""
 LIMIT: Final = 0.1
-"""[%]."""
+"""Largest deviation from the scaling law that passes [%]."""
 
 
 class Scale(NamedTuple):
     """Factors on gravity, lengths and masses."""
 
     q: float
+    """Factor on gravity."""
     r: float
+    """Factor on lengths."""
     s: float
+    """Factor on masses."""
 
 
 class Case(NamedTuple):
-    """A wheel that is scaled."""
+    """A driven wheel under a law, before it is scaled."""
 
     wheel: WheelParameters
+    """The wheel on its carriage."""
     rpm: float
+    """Imposed rate [1/min]."""
     law: str
+    """The law's name."""
     lambda_: float
+    """Inertial factor of the sand [-]."""
     structural: bool
+    """Whether the sand's surface drops behind the wheel, as [Agarwal] B.1 has it."""
 
 
 CASES: Final = {
@@ -59,7 +70,7 @@ SCALES: Final = {
 
 
 def jobs(request: Request) -> dict[str, Callable[[], Any]]:
-    """Every case at every scale."""
+    """A job for every case at every scale, and at none."""
     chosen = [("", ONE), *SCALES.items()][:: 3 if request.quick else 1]
     return {
         f"{case}/{scale}": functools.partial(simulate, CASES[case], factors)
@@ -69,7 +80,7 @@ def jobs(request: Request) -> dict[str, Callable[[], Any]]:
 
 
 def simulate(case: Case, scale: Scale) -> dict[str, float]:
-    """Steady speed, sinkage and power of a case at a scale, and what the scaling law divides them by."""
+    """Steady speed [m/s], sinkage [m] and power [W] of a case at a scale, each over what the law scales it by."""
     q, r, s = scale
     base = case.wheel
     wheel = dataclasses.replace(
@@ -97,7 +108,7 @@ def simulate(case: Case, scale: Scale) -> dict[str, float]:
 
 
 def rows(measured: Measured) -> list[Row]:
-    """Largest deviation from the scaling law of each case."""
+    """The rows of each case's largest deviation from the scaling law."""
     source = "exact, [Slonaker2017]"
     found = []
     for case in CASES:
@@ -107,14 +118,14 @@ def rows(measured: Measured) -> list[Row]:
 
 
 def _deviations(measured: Measured, case: str, name: str) -> dict[str, float]:
-    """From the unscaled case, by scale [%]."""
+    """Deviation of a quantity of a case from the unscaled one, by scale [%]."""
     base = measured[f"{case}/"][name]
     names = [scale for scale in SCALES if f"{case}/{scale}" in measured]
     return {scale: 100.0 * abs(measured[f"{case}/{scale}"][name] / base - 1.0) for scale in names}
 
 
 def draw(measured: Measured, figure: Any) -> None:
-    """Deviation of each case and scale, against the limit."""
+    """Draw the deviation of each case at each scale, against the limit."""
     panels = figure.subplots(1, 3, sharey=True)
     for axis, name in zip(panels, NAMES, strict=True):
         for k, case in enumerate(CASES):

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
+from types import ModuleType
 from typing import Any, Final, NamedTuple
 
 import mujoco
@@ -13,55 +14,50 @@ from rftsim.files import Kept
 from rftsim.validation import continuum, drill, measured, motion, plates, runner, scaling, wheel
 from rftsim.validation.study import Measured, Request, Row, Study
 
+
+def _study(says: str, module: ModuleType, size: tuple[float, float] = (11.0, 4.8)) -> Study:
+    """Make a study of what its module offers, with a figure of a size [inch]."""
+    return Study(says, module, module.jobs, module.rows, module.draw, size)
+
+
 STUDIES: Final = {
-    "wheel": Study("grousered wheel of [Agarwal] chapter 4 over its rate", wheel, wheel.jobs, wheel.rows, wheel.draw),
-    "runner": Study("four-flap runner over its rate", runner, runner.jobs, runner.rows, runner.draw),
-    "plates": Study("plates dragged, pushed and oblique", plates, plates.jobs, plates.rows, plates.draw, (13.0, 4.5)),
-    "measured": Study(
-        "wheel and plates measured in dry sand", measured, measured.jobs, measured.rows, measured.draw, (15.0, 9.0)
-    ),
-    "scaling": Study("scaling of whole simulations", scaling, scaling.jobs, scaling.rows, scaling.draw, (12.0, 4.5)),
-    "drill": Study(
-        "drilling cylinder of [Agarwal] section 5.10", drill, drill.jobs, drill.rows, drill.draw, (15.0, 4.5)
-    ),
-    "continuum": Study(
-        "3D-RFT against the plates and solids of the material point method",
-        continuum,
-        continuum.jobs,
-        continuum.rows,
-        continuum.draw,
-        (15.0, 5.0),
-    ),
-    "motion": Study(
-        "dynamic laws against plates at speed and wheels of the material point method",
-        motion,
-        motion.jobs,
-        motion.rows,
-        motion.draw,
-        (15.0, 4.8),
+    "wheel": _study("grousered wheel of [Agarwal] chapter 4 over its rate", wheel),
+    "runner": _study("four-flap runner over its rate", runner),
+    "plates": _study("plates dragged, pushed and oblique", plates, (13.0, 4.5)),
+    "measured": _study("wheel and plates measured in dry sand", measured, (15.0, 9.0)),
+    "scaling": _study("scaling of whole simulations", scaling, (12.0, 4.5)),
+    "drill": _study("drilling cylinder of [Agarwal] section 5.10", drill, (15.0, 4.5)),
+    "continuum": _study("3D-RFT against the plates and solids of the material point method", continuum, (15.0, 5.0)),
+    "motion": _study(
+        "dynamic laws against plates at speed and wheels of the material point method", motion, (15.0, 4.8)
     ),
 }
 """Every study by name."""
 
-
 SHARED: Final = ("balance", "cmu", "plates", "pockets", "shipped", "terramechanics")
-"""Modules that studies compute with."""
+"""Modules of this folder that the studies' modules compute with."""
+PRESENTATION: Final = ("cli", "bench", "validation", "view")
+"""Folders that no study computes with, except for its own modules."""
 
 
-class Found(NamedTuple):
-    """A finished study."""
+class Finished(NamedTuple):
+    """A study that has run, with what it measured."""
 
     name: str
+    """The study's name."""
     study: Study
+    """The study itself."""
     measured: Measured
+    """Its measurements, by the names of its jobs."""
     rows: list[Row]
+    """Its table."""
 
 
 def choose(names: Iterable[str]) -> list[str]:
-    """The named studies, or all.
+    """The names of the studies that are named, or of all where none is.
 
     Raises:
-        RftsimError: No such study.
+        RftsimError: There is no study of such a name.
     """
     names = list(dict.fromkeys(names))
     for name in names:
@@ -70,7 +66,7 @@ def choose(names: Iterable[str]) -> list[str]:
     return names or list(STUDIES)
 
 
-def run(names: list[str], request: Request, memory: Path, report: Callable[[str], Any]) -> Iterator[Found]:
+def run(names: list[str], request: Request, memory: Path, report: Callable[[str], Any]) -> Iterator[Finished]:
     """Run studies, taking from the memory what was measured before; `report` is called with the name of each job."""
     for name in names:
         study = STUDIES[name]
@@ -79,13 +75,13 @@ def run(names: list[str], request: Request, memory: Path, report: Callable[[str]
         for job, measure in study.jobs(request).items():
             results[job] = kept.get(job, measure)
             report(f"{name} {job}")
-        yield Found(name, study, results, study.rows(results))
+        yield Finished(name, study, results, study.rows(results))
 
 
 def _inputs(study: Study) -> bytes:
     """The source of everything that a study computes with."""
     ours = Path(rftsim.__file__).parent
-    outside = {ours / name for name in ("cli", "bench", "validation")}
+    outside = {ours / name for name in PRESENTATION}
     files = [path for path in ours.rglob("*.py") if not outside & set(path.parents)]
     files += Path(rftsim_models.__file__).parent.rglob("*.py")
     files += [Path(str(study.module.__file__)), *(ours / "validation" / f"{name}.py" for name in SHARED)]

@@ -1,4 +1,4 @@
-"""What a study is: measurements by name, and the rows and the figure that they amount to."""
+"""Studies: measurements by name, and the rows and the figure that they amount to."""
 
 import dataclasses
 import math
@@ -7,8 +7,10 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
 
+from rftsim.view.figure import make_figure, save_figure
+
 Measured = Mapping[str, Any]
-"""What was measured, by the names of the jobs."""
+"""The measurements of a study, by the names of its jobs."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -16,14 +18,14 @@ class Row:
     """A line of a study's table.
 
     Attributes:
-        what: The quantity.
+        what: The quantity that is compared.
         got: Its value; None where it could not be had.
         source: Where the expected value is from.
-        unit: Of the values.
-        expected: What it should be; None where only a bound, or nothing, is known.
+        unit: Unit of the values.
+        expected: The value that it should have; None where only a bound, or nothing, is known.
         low: Smallest value that passes.
         high: Largest value that passes.
-        note: What a reader should know, above all why it fails.
+        note: A remark for the reader, above all why it fails.
     """
 
     what: str
@@ -37,55 +39,55 @@ class Row:
 
     @property
     def passed(self) -> bool | None:
-        """Whether it passes; None where there is nothing to pass."""
+        """Whether the value lies within its bounds; None where it has none, or is not there."""
         if self.got is None or (math.isinf(self.low) and math.isinf(self.high)):
             return None
         return bool(self.low <= self.got <= self.high)
 
     @property
     def error(self) -> float | None:
-        """Relative error; None where no value is expected."""
+        """Relative error of the value; None where no value is expected."""
         if self.got is None or not self.expected:
             return None
         return self.got / self.expected - 1.0
 
 
 def near(what: str, got: float, expected: float, within: float, source: str, **more: Any) -> Row:
-    """A row that passes within an absolute distance of what is expected."""
+    """Make a row that passes within an absolute distance of what is expected."""
     return Row(what, got, source, expected=expected, low=expected - within, high=expected + within, **more)
 
 
 def at_most(what: str, got: float, limit: float, source: str, **more: Any) -> Row:
-    """A row with an upper limit."""
+    """Make a row that passes where the value is at most a limit."""
     return Row(what, got, source, high=limit, **more)
 
 
 def at_least(what: str, got: float, limit: float, source: str, **more: Any) -> Row:
-    """A row with a lower limit."""
+    """Make a row that passes where the value is at least a limit."""
     return Row(what, got, source, low=limit, **more)
 
 
 class Request(NamedTuple):
-    """What a study is asked for."""
+    """The wishes that a study's measurements follow."""
 
     quick: bool
-    """Fewer measurements."""
+    """Whether fewer measurements will do."""
     data: Path
-    """Folder of measured data."""
+    """Folder of measured data, which need not be there."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Study:
-    """A study.
+    """A comparison of the laws with something: its measurements, its table and its figure.
 
     Attributes:
-        says: What it compares with what.
-        module: Its own source, for the cache.
+        says: A line that says what it compares.
+        module: The module that it measures with, whose source is part of the measurements' identity.
         jobs: Its measurements by name, each a function to what JSON can hold; a name holds everything that the
-            measurement depends on besides the source.
+            measurement depends on besides the sources.
         rows: Its table, from what was measured.
         draw: Its figure, on a matplotlib Figure.
-        size: Of the figure [inch].
+        size: Width and height of the figure [inch].
     """
 
     says: str
@@ -94,3 +96,10 @@ class Study:
     rows: Callable[[Measured], list[Row]]
     draw: Callable[[Measured, Any], None]
     size: tuple[float, float] = (11.0, 4.8)
+
+
+def plot_study(study: Study, measured: Measured, path: Path) -> None:
+    """Draw the figure of a study, from what it measured, into a file."""
+    figure = make_figure(study.size)
+    study.draw(measured, figure)
+    save_figure(figure, path)

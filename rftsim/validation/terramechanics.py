@@ -12,56 +12,59 @@ from rftsim.validation.balance import steady
 
 
 class Soil(NamedTuple):
-    """A soil of [Agarwal] eqs. (1.4) and (1.5)."""
+    """The parameters of a soil, as [Agarwal] eqs. (1.4) and (1.5) have them."""
 
     k_c: float
-    """[N/m^(n+1)]."""
+    """Cohesive modulus of sinkage [N/m^(n+1)]."""
     k_phi: float
-    """[N/m^(n+2)]."""
+    """Frictional modulus of sinkage [N/m^(n+2)]."""
     exponent: float
-    """n [-]."""
+    """Exponent n of sinkage [-]."""
     friction: float
-    """tan phi [-]."""
+    """Tangent of the friction angle phi [-]."""
     shear: float
     """Shear displacement modulus K [m]."""
     cohesion: float = 0.0
-    """c [Pa]."""
+    """Cohesion c [Pa]."""
     tested: tuple[float, float] = (0.01, math.inf)
     """Least and largest width b for which k_c / b is known [m]; it is not extrapolated."""
     c1: float = 0.18
-    """Where the stress peaks, theta_m = (c1 + c2 slip) theta_f, in loose sand [Wong1967]."""
+    """First factor of where the stress peaks, theta_m = (c1 + c2 slip) theta_f, in loose sand [Wong1967]."""
     c2: float = 0.32
+    """Second factor of where the stress peaks."""
 
     def stiffness(self, width: float) -> float:
-        """k_c / b + k_phi [N/m^(n+2)]."""
+        """The modulus k_c / b + k_phi of a contact whose lesser extent b is a width [m]; in N/m^(n+2)."""
         return self.k_c / min(max(width, self.tested[0]), self.tested[1]) + self.k_phi
 
 
 SHEAR_LOOSE: Final = 0.025
-"""K of loose sand, [Wong2008] [m]."""
+"""Shear displacement modulus K of loose sand, [Wong2008] [m]."""
 DRY_SAND: Final = Soil(990.0, 1.52843e6, 1.1, math.tan(math.radians(28)), SHEAR_LOOSE, cohesion=1040.0)
 """Dry sand of the Land Locomotion Laboratory, [Wong2008]."""
 POPPY: Final = Soil(0.0, float(PRESETS["poppy-seeds"].zeta or 0.0), 1.0, math.tan(math.radians(36)), 0.045)
 """Loose poppy seeds: the plate's 0.35 N/cm^3 of [Agarwal] Table 4.2, friction and K of [Agarwal2019]."""
 POPPY_SOURCE: Final = "Wong-Reece; plate of Table 4.2, φ and K of [Agarwal2019]"
+"""Source of the poppy seeds' numbers."""
 POINTS: Final = 400
+"""Points of the integrals over the contact."""
 
 
 class WheelForce(NamedTuple):
-    """Force of the soil on the wheel [N]."""
+    """Force of the soil on the wheel, by its components."""
 
     drawbar: float
-    """Along x, its heading."""
+    """Component along x, the wheel's heading [N]."""
     side: float
-    """Along y."""
+    """Component along y, across the heading [N]."""
     load: float
-    """Upward."""
+    """Upward component [N]."""
 
 
 def wheel_force(
     soil: Soil, radius: float, width: float, sinkage: float, rim: float, velocity: tuple[float, float]
 ) -> WheelForce:
-    """A rigid wheel at a given sinkage; [Agarwal] eqs. (1.4), (1.5), and [Wong1967].
+    """Force of the soil on a rigid wheel at a given sinkage; [Agarwal] eqs. (1.4), (1.5), and [Wong1967].
 
     Normal stress rises from entry (theta_f) to theta_m and falls to zero at the bottom. The shear displacement is the
     slip velocity's time integral since entry, and the shear stress points along it; across the wheel as in
@@ -69,11 +72,11 @@ def wheel_force(
 
     Args:
         soil: The soil.
-        radius: Outer radius [m].
-        width: Width [m].
-        sinkage: Of the outer circle [m].
+        radius: Outer radius of the wheel [m].
+        width: Width of the wheel [m].
+        sinkage: Sinkage of the outer circle [m].
         rim: Speed of the rim, omega R, positive [m/s].
-        velocity: Of the axle, along and across the heading [m/s].
+        velocity: Velocity of the axle, along and across the heading [m/s].
     """
     entry = math.acos(1.0 - min(max(sinkage / radius, 1e-9), 1.0))
     slip = 1.0 - velocity[0] / rim if velocity[0] < rim else rim / velocity[0] - 1.0
@@ -103,7 +106,7 @@ def wheel_force(
 def sinkage_under(
     soil: Soil, load: float, radius: float, width: float, rim: float, velocity: tuple[float, float]
 ) -> float:
-    """Sinkage at which a wheel carries a load [m]; the radius where none does."""
+    """Find the sinkage at which a wheel carries a load [N]; the radius where none does [m]."""
 
     def excess(sinkage: float) -> float:
         return wheel_force(soil, radius, width, sinkage, rim, velocity).load - load

@@ -13,17 +13,20 @@ from rftsim.validation import balance, terramechanics
 from rftsim.validation.study import Measured, Request, Row, at_least, at_most, near
 
 WHEELS: Final = ("grouser-wheel", "half-grouser-wheel")
+"""Scenes of the wheel and of its twin."""
 LAWS: Final = ("rft2d", "drft2d")
 RATES: Final = (2.0, 5.0, 10.0, 20.0, 30.0, 45.0, 60.0, 75.0, 90.0)
+"""Imposed rates [1/min]."""
 QUICK_RATES: Final = (10.0, 30.0, 90.0)
+"""Imposed rates where fewer will do [1/min]."""
 RULES: Final = {"one third": 1.0 / 3.0, "full grousers": 1.0, "least power": None}
-"""Shares of their height that grousers keep."""
+"""Shares of their height that grousers keep, by rule; None where the cheaper flow decides."""
 TWIN: Final = 90.0 / math.sqrt(2.0)
 """Rate of the wheel at which it must do as its half-size twin does at 90: r omega^2 / g is then the same [1/min]."""
 
 
 def jobs(request: Request) -> dict[str, Callable[[], Any]]:
-    """Every wheel, law and rate."""
+    """A job for every wheel, law and rate, and for every balance of forces."""
     rates = QUICK_RATES if request.quick else RATES
     found: dict[str, Callable[[], Any]] = {
         f"{scene}/{law}/{rpm:g}": functools.partial(_point, scene, law, rpm)
@@ -46,7 +49,7 @@ def _curve(measured: Measured, scene: str, law: str) -> list[dict[str, Any]]:
 
 
 def _rolling(points: list[dict[str, Any]]) -> list[float]:
-    """The ratio v / (R omega)."""
+    """The ratio v / (R omega) of each point [-]."""
     return [1.0 - point["slip"] for point in points]
 
 
@@ -55,7 +58,7 @@ def _spread(values: list[float]) -> float:
 
 
 def rows(measured: Measured) -> list[Row]:
-    """Published trends, an independent program's numbers, and the exact ones of appendix B."""
+    """The rows of published trends, an independent program's numbers, and the exact ones of appendix B."""
     static, dynamic = (_curve(measured, "grouser-wheel", law) for law in LAWS)
     half_static, half = (_curve(measured, "half-grouser-wheel", law) for law in LAWS)
     at = {f"{point['rpm']:g}": point for point in dynamic}
@@ -90,7 +93,7 @@ def rows(measured: Measured) -> list[Row]:
 
 
 def draw(measured: Measured, figure: Any) -> None:
-    """Speed and sinkage over spin, dimensionless as in [Agarwal] Fig. 4-7."""
+    """Draw speed and sinkage over spin, dimensionless as in [Agarwal] Fig. 4-7."""
     left, right = figure.subplots(1, 2)
     for scene, colour in zip(WHEELS, ("C0", "0.2"), strict=True):
         for law, line in zip(LAWS, ("--", "-"), strict=True):

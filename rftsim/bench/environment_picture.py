@@ -1,0 +1,40 @@
+"""The picture of the study of the environment: what sand costs a step, and the throughput of many simulations."""
+
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from rftsim.bench.environment import LIMITS, SIMULATIONS, THREADS, Ground, Timed
+from rftsim.view.figure import make_figure, save_figure
+
+COLOURS: Final[dict[Ground, str]] = {"explicit": "C3", "implicit": "C0"}
+"""Colour of each force's bars."""
+
+
+def plot_environment(rows: list[Timed], path: Path) -> None:
+    """Draw what sand costs: the step over the one without sand, and the throughput of batches over it."""
+    figure = make_figure((11, 4.5))
+    left, right = figure.subplots(1, 2)
+    cases = list(dict.fromkeys((row.subject, row.law) for row in rows))
+    place = np.arange(len(cases))
+    for k, (force, colour) in enumerate(COLOURS.items()):
+        own = [row for row in rows if row.sand == force]
+        limit = LIMITS[force]
+        left.bar(place + 0.35 * (k - 0.5), [row.ratio for row in own], 0.33, color=colour, label=force)
+        left.axhline(limit, color=colour, linestyle="--", linewidth=1)
+        right.axhline(1.0 / limit, color=colour, linestyle="--", linewidth=1)
+        for j, threads in enumerate(THREADS):
+            at, shares = place + 0.18 * (2 * k + j - 1.5), [row.batch[threads][1] for row in own]
+            label = f"{force}, {threads} thread{'s' if threads > 1 else ''}"
+            right.bar(at, shares, 0.16, color=colour, alpha=1.0 - 0.5 * j, label=label)
+    left.set_yscale("log")
+    left.set_yticks([1, 2, 3, 5, 10, 20, 30], ["1", "2", "3", "5", "10", "20", "30"])
+    left.set_ylabel("step, over that without sand")
+    right.set_ylabel(f"throughput of {SIMULATIONS}, over that without sand")
+    for axis in (left, right):
+        axis.set_xticks(place, [f"{name}\n{law}" for name, law in cases])
+        axis.grid(alpha=0.3, axis="y")
+        axis.legend()
+    figure.suptitle("What sand adds to MuJoCo's step (dashed: what the wheel was asked to keep)")
+    save_figure(figure, path)

@@ -1,0 +1,171 @@
+"""The parts of a model that a recording shows, and the numbers that it keeps of each moment."""
+
+import math
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from rftsim.law import layout
+from rftsim.model.geometry import body_surface, is_colliding
+from rftsim.model.readout import Instance, body_velocities, instances, tractions, wrenches
+from rftsim.surface.triangles import Array
+
+
+class Plane(NamedTuple):
+    """The free surface of a bed of sand, with axes in it."""
+
+    along: Array
+    """Unit vector in the surface and in the x-z plane, shape (3,)."""
+    across: Array
+    """Unit vector in the surface, normal to `along`, shape (3,)."""
+    up: Array
+    """Unit normal, out of the sand, shape (3,)."""
+    offset: float
+    """Distance of the surface from the world's origin, along `up` [m]."""
+
+
+class Skin(NamedTuple):
+    """The drawn triangles of a body that feels the sand."""
+
+    body: int
+    """The body's id."""
+    geoms: list[int]
+    """Ids of the geoms that the triangles stand for."""
+    area: float
+    """Area of what feels the sand [m^2]."""
+    triangles: Array
+    """Corners in the body's frame [m], shape (nface, 3, 3)."""
+    nearest: NDArray[np.intp]
+    """Index of the triangle of `tractions` whose traction each shows, shape (nface,)."""
+
+
+class Portrait(NamedTuple):
+    """A model as recordings show it: its sand, its bodies, and their size and weight."""
+
+    model: mujoco.MjModel
+    """The compiled model."""
+    beds: list[tuple[Instance, Plane]]
+    """Each bed of sand and its free surface."""
+    skins: list[Skin]
+    """The drawn triangles of each body that feels sand."""
+    roots: list[int]
+    """Ids of the bodies whose speed is shown; the view follows the first."""
+    weight: float
+    """Weight of everything that can move [N]."""
+    centre: Array
+    """Middle of everything that can move, at the start [m], shape (3,)."""
+    extent: float
+    """Longest side of a box around everything that can move [m]."""
+
+    @property
+    def cell(self) -> float:
+        """Side of a cell of the sand's grid [m]."""
+        return _round_down(self.extent / 3.0)
+
+    @property
+    def felt(self) -> list[int]:
+        """Ids of the bodies that feel sand."""
+        return [skin.body for skin in self.skins]
+
+    def name(self, body: int) -> str:
+        """The name of a body, or one made of its id where it has none."""
+        return self.model.body(body).name or f"body{body}"
+
+
+class Frame(NamedTuple):
+    """The numbers of one moment; or, with one more axis in front, those of all frames."""
+
+    time: Any
+    """Time of the recording [s]."""
+    position: Array
+    """Origin of each body [m], shape (nbody, 3)."""
+    quaternion: Array
+    """Attitude of each body in Rerun's order, xyzw, shape (nbody, 4)."""
+    speed: Array
+    """Speed of each root body [m/s], shape (nroot,)."""
+    force: Array
+    """The sand's force on each body that feels it [N], shape (nfelt, 3)."""
+    moment: Array
+    """The sand's moment about each such body's origin [N m], shape (nfelt, 3)."""
+    depth: Array
+    """Depth of each such body's deepest triangle [m], shape (nfelt,)."""
+    power: Any
+    """Power of the sand on all bodies [W]."""
+    traction: NDArray[np.float32]
+    """Traction on each drawn triangle, one skin after the other [Pa]; -1 where it is not active."""
+
+
+def describe(model: mujoco.MjModel) -> Portrait:
+    """Gather what a recording shows of a model, as the model stands at its start."""
+    start = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, start)
+    beds = instances(model)
+    skins = [_make_skin(model, start, body) for bed in beds for body in bed.bodies]
+    roots = np.unique(model.body_rootid[[skin.body for skin in skins] or slice(1, None)]).tolist()
+    weight = float(model.body_mass[model.body_weldid != 0].sum() * np.linalg.norm(model.opt.gravity))
+    return Portrait(model, [(bed, _make_plane(bed.sand)) for bed in beds], skins, roots, weight, *_bounds(model, start))
+
+
+def _make_skin(model: mujoco.MjModel, start: mujoco.MjData, body: int) -> Skin:
+    """Find the geoms that have the area of what feels the sand, and take their corners: `tractions` has none."""
+    felt = tractions(model, start, body)
+    area = float(felt.area.sum())
+    own = range(model.body_geomadr[body], model.body_geomadr[body] + model.body_geomnum[body])
+    for collision_only in (True, False):
+        drawn = body_surface(model, body, collision_only=collision_only, max_edge=None, allow_open=True)
+        geoms = [geom for geom in own if is_colliding(model, geom) or not collision_only]
+        if drawn is not None and np.isclose(drawn.areas.sum(), area, rtol=0.05):  # facets have a little less
+            break
+    assert drawn is not None, "a body that feels sand has geoms"
+    rotation = start.xmat[body].reshape(3, 3)
+    centres, normals = (felt.centre - start.xpos[body]) @ rotation, drawn.size * felt.normal @ rotation
+    tree = cKDTree(np.hstack([centres, normals]))  # normals too, so that thin plates keep their sides apart
+    _, nearest = tree.query(np.hstack([drawn.centres, drawn.size * drawn.normals]))
+    return Skin(body, geoms, area, drawn.triangles, nearest)
+
+
+def _make_plane(sand: Array) -> Plane:
+    value = dict(zip(layout.SAND_FIELDS, sand.tolist(), strict=False))
+    up = np.array([value["up_x"], value["up_y"], value["up_z"]])
+    along = np.array([up[2], 0.0, -up[0]]) / math.hypot(up[2], up[0])
+    return Plane(along, np.cross(up, along), up, value["offset"])
+
+
+def _bounds(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[Array, float]:
+    """Centre and longest side of a box around the geoms that can move, or MuJoCo's where none can [m]."""
+    geoms = (model.body_weldid[model.geom_bodyid] != 0) & (model.geom_rbound > 0.0)
+    if not geoms.any():
+        return model.stat.center.copy(), float(model.stat.extent)
+    radii = model.geom_rbound[geoms, None]
+    low, high = (data.geom_xpos[geoms] - radii).min(axis=0), (data.geom_xpos[geoms] + radii).max(axis=0)
+    return 0.5 * (low + high), float((high - low).max())
+
+
+def _round_down(x: float) -> float:
+    """The largest of 1, 2, 5 times a power of ten that does not exceed x."""
+    power = 10.0 ** math.floor(math.log10(x))
+    return max(digit * power for digit in (1.0, 2.0, 5.0) if digit * power <= x)
+
+
+def sample(portrait: Portrait, data: mujoco.MjData, time: float) -> Frame:
+    """Read one frame from a model's data, to stand at a time of the recording [s]."""
+    sand, felt = wrenches(portrait.model, data), portrait.felt
+    found = [tractions(portrait.model, data, body) for body in felt]
+    strengths = [
+        np.where(one.active, np.linalg.norm(one.stress, axis=1), -1.0)[skin.nearest]
+        for one, skin in zip(found, portrait.skins, strict=True)
+    ]
+    return Frame(
+        time=time,
+        position=data.xpos.copy(),
+        quaternion=data.xquat[:, [1, 2, 3, 0]],
+        speed=np.linalg.norm(body_velocities(portrait.model, data)[0][portrait.roots], axis=1),
+        force=sand.force[felt],
+        moment=sand.moment[felt],
+        depth=np.array([one.depth.max() for one in found]),
+        power=sand.power.sum(),
+        traction=np.concatenate([np.empty(0), *strengths], dtype=np.float32),
+    )
