@@ -1,21 +1,21 @@
-"""What rftsim raises and warns with."""
+"""The errors that rftsim raises, and the warning that it warns with."""
 
 
 class RftsimError(ValueError):
-    """An input that cannot be: what was wrong, and what would have been right."""
+    """Error of an input that cannot be: says what was wrong, and what would have been right."""
 
 
 class SandError(RftsimError):
-    """Sand that cannot be."""
+    """Error of a sand that cannot be, by its parameters or its name."""
 
 
 class SurfaceError(RftsimError):
-    """A mesh that cannot bound a body: names the mesh and, where it can, the face."""
+    """Error of a mesh that cannot bound a body: names the mesh and, where it can, the face."""
 
 
 class SceneError(RftsimError):
-    """A MuJoCo model that sand cannot be put under."""
+    """Error of a MuJoCo model that sand cannot be put under."""
 
 
 class RftsimWarning(UserWarning):
-    """Something that will be computed but is doubtful; with numbers."""
+    """Warning of something that will be computed but is doubtful, with numbers."""

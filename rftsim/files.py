@@ -14,7 +14,7 @@ from rftsim.errors import RftsimError
 
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """A temporary file beside `path` that takes its place, on the disk, when the block ends well.
+    """A context with a temporary file beside `path`, which takes its place on the disk when the block ends well.
 
     Raises:
         RftsimError: The folder cannot be written.
@@ -37,7 +37,7 @@ def check_writable(path: Path, *suffixes: str) -> None:
     """Refuse a path whose folder is missing or not writable, or whose ending is none of `suffixes`.
 
     Raises:
-        RftsimError: As said.
+        RftsimError: The path cannot be written, or must end otherwise.
     """
     if suffixes and path.suffix.lower() not in suffixes:
         raise RftsimError(f"{path} must end in {' or '.join(suffixes)}")
@@ -50,11 +50,11 @@ def check_writable(path: Path, *suffixes: str) -> None:
 
 
 class Kept:
-    """Measurements by name.
+    """Measurements by name, kept in a file from one run to the next.
 
     Args:
-        path: The file, JSON; written whole after each measurement.
-        inputs: Everything that all the measurements depend on; what was kept under other inputs is measured again.
+        path: The file, in JSON; written whole after each measurement.
+        inputs: All that the measurements depend on; what was kept under other inputs is measured again.
     """
 
     def __init__(self, path: Path, inputs: bytes) -> None:
@@ -67,7 +67,7 @@ class Kept:
                 self.known = kept["known"]
 
     def get(self, name: str, measure: Callable[[], Any]) -> Any:
-        """What `measure` gives, as JSON has it, measured now or before."""
+        """The measurement of that name, as JSON has it, by `measure` now or from before."""
         if name not in self.known:
             self.known[name] = measure()
             with replacing(self.path) as temporary:

@@ -30,7 +30,7 @@ UPWARD = (-0.1, 0.0, 1.0)
 @pytest.fixture(scope="module")
 def drop(tmp_path_factory):
     """A recorded drop: the model, the file's contents, and what `rftsim` said at each frame."""
-    model = rftsim.load(DROP, surface=rftsim.FreeSurface(0.01, UPWARD))
+    model = rftsim.load(DROP, terrain=rftsim.FreeSurface(0.01, UPWARD))
     data, path, truth = mujoco.MjData(model), tmp_path_factory.mktemp("drop") / "drop.rrd", []
     with record.Recorder(model, path, fps=FPS) as recorder:
         while data.time < 0.8:

@@ -59,8 +59,8 @@ def _play_re_entry(trial: Trial) -> Quantities:
 
 def _build_slope(h: float, force: Force) -> Trial:
     slope = np.array([-0.3, 0.0, 1.0])
-    surface = FreeSurface(normal=tuple(slope / np.linalg.norm(slope)))
-    return Trial(make_spec(free_body(plate(0.3), "0 0 .03")), h, force, surface=surface)
+    terrain = FreeSurface(normal=tuple(slope / np.linalg.norm(slope)))
+    return Trial(make_spec(free_body(plate(0.3), "0 0 .03")), h, force, terrain=terrain)
 
 
 def _play_slope(trial: Trial) -> Quantities:

@@ -11,7 +11,7 @@ from rich.table import Table
 from rftsim.cli.output import print_json, print_line, progress
 from rftsim.cli.results import draw, picture_in
 from rftsim.errors import RftsimError
-from rftsim.run.rates import LAWS, RATES, Point, measure_all, points
+from rftsim.run.rate_sweep import LAWS, RATES, Point, measure_all, points
 from rftsim.run.run import run
 from rftsim.run.scenes import stage
 from rftsim.view.rates import plot_rates

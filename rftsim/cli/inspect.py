@@ -58,7 +58,7 @@ class Inspect:
                     "law": bed.law.name,
                     "law_says": bed.law.says,
                     "sand": dataclasses.asdict(bed.sand),
-                    "surface": dataclasses.asdict(bed.free_surface),
+                    "surface": dataclasses.asdict(bed.terrain),
                     "timestep_s": float(whole.model.opt.timestep),
                     "bodies": bodies,
                     "triangles": sum(surface.ntri for surface in bed.surfaces.values()),

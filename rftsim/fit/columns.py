@@ -1,4 +1,4 @@
-"""Columns of a CSV file."""
+"""Columns of a CSV file by name, read and checked."""
 
 import csv
 import math
@@ -12,21 +12,23 @@ from rftsim.surface.triangles import Array
 
 
 class Columns(NamedTuple):
-    """Columns by name."""
+    """The columns of a table by name, those of numbers and those of text."""
 
     numbers: dict[str, Array]
+    """Columns of numbers, shape (n,) each."""
     words: dict[str, list[str]]
+    """Columns of text, n words each."""
 
 
 def read_columns(path: Path, needed: tuple[str, ...], optional: tuple[str, ...] = ()) -> dict[str, Array]:
-    """Columns of numbers, see `read_table`."""
+    """The columns of numbers of a CSV file by name, shape (n,) each; see `read_table`."""
     return read_table(path, needed, optional).numbers
 
 
 def read_table(
     path: Path, needed: tuple[str, ...], optional: tuple[str, ...] = (), words: tuple[str, ...] = ()
 ) -> Columns:
-    """Columns of a CSV by the names in its first line; lines that start with # are passed over.
+    """The columns of a CSV by the names in its first line; lines that start with # are passed over.
 
     Args:
         path: The file.

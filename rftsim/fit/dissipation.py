@@ -28,11 +28,16 @@ _CUTS: Final = 50
 _STARTS: Final = 200
 _CLOSE: Final = 0.1
 _RANGE: Final = ((0.0, math.pi / 2), (-math.pi / 2, math.pi / 2), (0.0, math.pi))
-"""Of beta, gamma and psi [rad]: every orientation of a face and motion."""
+"""Ranges of beta, gamma and psi [rad]: every orientation of a face and motion."""
 
 
 def power_rows(angles: Array, degree: int) -> Array:
-    """The matrix from coefficients to alpha_gen . v at (beta, gamma, psi) [rad], (k, 3) to (k, 3 terms)."""
+    """The matrix from coefficients to alpha_gen . v at angles, shape (k, 3 terms).
+
+    Args:
+        angles: beta, gamma and psi [rad], shape (k, 3).
+        degree: Degree of the polynomials.
+    """
     x = _projections(angles)
     t = terms(x, degree)
     return np.concatenate([x[:, 2:] * t, t, x[:, :1] * t], axis=1)
@@ -55,9 +60,14 @@ def _on_grid(step_deg: float, degree: int) -> tuple[Array, Array, Array]:
 
 
 def largest_power(theta: Array, degree: int, step_deg: float) -> tuple[float, Array]:
-    """Largest alpha_gen . v and where its maxima are, (k, 3) [rad].
+    """The largest power, alpha_gen.v, at any orientation and motion, and where its maxima are [rad], shape (k, 3).
 
     From the best points of a grid, no two of them close in (x1, x2, x3), it goes uphill by ever smaller steps.
+
+    Args:
+        theta: Coefficients of f1, f2 and f3, shape (3 terms,).
+        degree: Degree of the polynomials.
+        step_deg: Step of the grid of angles [deg].
     """
     grid, rows, cells = _on_grid(step_deg, degree)
     order = np.argsort(-(rows @ theta))
@@ -72,10 +82,16 @@ def largest_power(theta: Array, degree: int, step_deg: float) -> tuple[float, Ar
 
 
 def dissipative(a: Array, rhs: Array, start: Array, degree: int) -> Array:
-    """The least-squares solution of a x = rhs for which alpha_gen . v <= 0, by cutting planes.
+    """The least-squares solution of a x = rhs for which alpha_gen . v <= 0, by cutting planes, shape (nunknown,).
 
     Unknowns behind the table's coefficients are free. Constraints are added where they are broken, on a grid and at the
     maxima between its points, until none is.
+
+    Args:
+        a: Matrix of the problem, shape (nrow, nunknown).
+        rhs: Right-hand side, shape (nrow,).
+        start: Solution without constraints, shape (nunknown,).
+        degree: Degree of the polynomials.
 
     Raises:
         RftsimError: The constraints could not all be met.
@@ -86,21 +102,27 @@ def dissipative(a: Array, rhs: Array, start: Array, degree: int) -> Array:
     r, q = factor[:-1, :-1], factor[:-1, -1]
     cuts, x = np.empty((0, size)), start
     for _ in range(_ROUNDS):
-        power = rows @ x[:size]
-        worst = np.argsort(-power)[:_CUTS]
-        broken = rows[worst[power[worst] > -0.5 * MARGIN]]
+        broken = _broken(rows, x[:size], degree)
         if not len(broken):
-            for step in (GRID_DEG, FINE_DEG):
-                best, places = largest_power(x[:size], degree, step)
-                if best > -0.5 * MARGIN:
-                    break
-            else:
-                return x
-            broken = power_rows(places, degree)
+            return x
         cuts = np.vstack([cuts, broken])
         x = _least(r, q, np.column_stack([cuts, np.zeros((len(cuts), len(x) - size))]))
         cuts = cuts[cuts @ x[:size] > -100 * MARGIN]  # those that bind, or nearly
     raise RftsimError(f"no table of degree {degree} that never adds energy was found in {_ROUNDS} rounds")
+
+
+def _broken(rows: Array, theta: Array, degree: int) -> Array:
+    """Power rows that coefficients break, on the grid or else at the maxima between its points, (k, 3 terms)."""
+    power = rows @ theta
+    worst = np.argsort(-power)[:_CUTS]
+    broken: Array = rows[worst[power[worst] > -0.5 * MARGIN]]
+    if len(broken):
+        return broken
+    for step in (GRID_DEG, FINE_DEG):
+        best, places = largest_power(theta, degree, step)
+        if best > -0.5 * MARGIN:
+            return power_rows(places, degree)
+    return broken
 
 
 def _least(r: Array, q: Array, cuts: Array) -> Array:

@@ -8,34 +8,38 @@ from rftsim.errors import RftsimError
 from rftsim.surface.triangles import Array
 
 CONFIDENCE: Final = 0.95
+"""Probability with which an interval holds its coefficient."""
 DRAWS: Final = 2000
-"""Of the bootstrap."""
+"""Samples that the bootstrap draws."""
 
 
 class Estimate(NamedTuple):
-    """A coefficient."""
+    """A coefficient of a straight law, and how far it is known."""
 
     value: float
+    """The coefficient itself."""
     low: float
+    """Lower end of the interval by Student's t: right for independent errors of one size."""
     high: float
-    """Ends of the interval by Student's t: right for independent errors of one size."""
+    """Upper end of that interval."""
     boot_low: float
+    """Lower end of the interval by a bootstrap of rows, or of whole tests where there are several: asks for neither."""
     boot_high: float
-    """Ends of the interval by a bootstrap of rows, or of whole tests where there are several: asks for neither."""
+    """Upper end of that interval."""
 
     def over(self, divisor: float) -> "Estimate":
-        """The estimate of a quantity that is so many times smaller."""
+        """The estimate of a quantity that is smaller by a divisor."""
         return Estimate(*(x / divisor for x in self))
 
 
 def estimate(columns: Array, y: Array, tests: Array | None = None, *, draws: int = DRAWS) -> list[Estimate]:
-    """The coefficients c of y = columns c + error.
+    """Estimates of the p coefficients c of y = columns c + error.
 
     Args:
-        columns: (n, p).
-        y: (n,).
-        tests: Which test each row belongs to, (n,): rows of one test err together.
-        draws: Of the bootstrap; 0 for none.
+        columns: What the coefficients multiply, shape (n, p).
+        y: What was measured, shape (n,).
+        tests: Number of the test that each row belongs to, shape (n,): rows of one test err together.
+        draws: Samples that the bootstrap draws; 0 for none.
 
     Raises:
         RftsimError: There are too few rows.

@@ -31,38 +31,42 @@ _SETTLED: Final = 1e-3
 
 @dataclasses.dataclass(frozen=True)
 class Settings:
-    """How a table is fitted.
-
-    Attributes:
-        degree: Of the polynomials: 3 (20 terms each) or 4 (35).
-        prior: As how many plates over its reference grid the source's table of this degree counts, to scale.
-        dissipative: Hold alpha_gen . v <= 0 at every orientation and motion, see `dissipation`.
-        mu_surf: Friction of the plates, for the law's cap.
-    """
+    """The settings by which a table is fitted to plates."""
 
     degree: int = 3
+    """Degree of the polynomials: 3 (20 terms each) or 4 (35)."""
     prior: float = 0.0
+    """As how many plates over its reference grid the source's table of this degree counts, to scale."""
     dissipative: bool = False
+    """Whether alpha_gen . v <= 0 is held at every orientation and motion, see `dissipation`."""
     mu_surf: float = math.inf
+    """Friction of the plates [-], for the law's cap."""
 
     @property
     def unknowns(self) -> int:
-        """Coefficients of f1, f2 and f3."""
+        """Number of the coefficients of f1, f2 and f3 together."""
         return 3 * len(SOURCE[self.degree])
 
 
 class Generic(NamedTuple):
-    """A fitted table and its scale."""
+    """A fitted table of the generic response, and its scale."""
 
     table: tuple[Term, ...]
+    """The coefficients of f1, f2 and f3 by monomial, over xi_n [-]."""
     xi_n: float
-    """[N/m^3]."""
+    """Strength of the sand under this table [N/m^3]."""
     condition: float
-    """Of the least-squares problem, prior included."""
+    """Condition number of the least-squares problem, prior included."""
 
 
 def design(normal: Array, motion: Array, degree: int) -> Array:
-    """The matrix from coefficients (f1's, f2's, f3's) to alpha_gen on faces, (k, 3, 3 terms)."""
+    """The matrix from coefficients (f1's, f2's, f3's) to alpha_gen on faces, shape (k, 3, 3 terms).
+
+    Args:
+        normal: Outward normals of the faces, shape (k, 3).
+        motion: Directions of their motion, shape (k, 3).
+        degree: Degree of the polynomials.
+    """
     m = np.where(normal[:, 2:] <= EDGE_ON_DOUBLE, normal, -normal)
     x = np.stack([-motion[:, 2], -m[:, 2], (m * motion).sum(axis=1)], axis=1)
     t = terms(x, degree)
@@ -71,7 +75,7 @@ def design(normal: Array, motion: Array, degree: int) -> Array:
 
 
 def on_plates(faces: Faces, count: int, degree: int) -> Array:
-    """The matrix from coefficients to alpha on plates, (3 count, 3 terms).
+    """The matrix from coefficients to alpha on plates, shape (3 count, 3 terms).
 
     On the two sides of a plate that moves edge-on the law's normal stresses cancel; what is left of them here is the
     tangential part.
@@ -98,7 +102,7 @@ def reference_grid() -> Plates:
 
 
 def coefficients(table: tuple[Term, ...]) -> Array:
-    """A table as one column: f1's, f2's, f3's, (3 terms,)."""
+    """The coefficients of a table in one column: f1's, f2's, f3's, shape (3 terms,)."""
     return np.concatenate(columns(table))
 
 
@@ -119,13 +123,13 @@ def fit(plates: Plates, settings: Settings) -> Generic:
 
 
 def determined(plates: Plates, settings: Settings) -> int:
-    """How many coefficients plates determine without a prior."""
+    """The number of coefficients that plates determine without a prior."""
     a = on_plates(leading_faces(plates), plates.n, settings.degree)
     return int(np.linalg.matrix_rank(a, tol=1e-9 * np.linalg.norm(a, 2)))
 
 
 def nearest(plates: Plates, settings: Settings) -> Generic:
-    """As `fit`; where the plates leave coefficients open, the smallest.
+    """The table and scale of `fit`, and where the plates leave coefficients open, the smallest.
 
     Raises:
         RftsimError: The plates feel no force, or by their fit none that has a scale.
@@ -204,13 +208,13 @@ def law_and_slope(faces: Faces, rows: Array, theta: Array, settings: Settings) -
     """The law on faces, at xi_n = 1, and its derivative by the coefficients, [Agarwal] eqs. (5.5) and (5.6).
 
     Args:
-        faces: Those that lead.
-        rows: Their `design`.
-        theta: Coefficients, (3 terms,).
-        settings: For mu_surf.
+        faces: The faces that lead.
+        rows: Their `design`, shape (k, 3, 3 terms).
+        theta: Coefficients, shape (3 terms,).
+        settings: Settings of the fit, for mu_surf.
 
     Returns:
-        Stress per depth times weight, (k, 3), and its derivative, (k, 3, 3 terms).
+        Stress per depth times weight, shape (k, 3), and its derivative, shape (k, 3, 3 terms).
     """
     n = faces.normal
     a = rows @ theta

@@ -1,4 +1,4 @@
-"""Pictures of fits."""
+"""Pictures of fits: a table against its plates, and a trial against its line."""
 
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ from rftsim.fit.trials import Found
 
 
 def plot_map(report: Report, title: str, path: Path) -> None:
-    """Draw the law against the plates: everything at once, and in plane over the direction of motion."""
+    """Draw the law against the plates into a file: everything at once, and in plane over the direction of motion."""
     from matplotlib.figure import Figure  # not before it is needed, as in `plots`
 
     figure = Figure(figsize=(15, 5.5), layout="constrained")
@@ -62,7 +62,7 @@ def _often(tilts: Any, most: int = 7) -> list[float]:
 
 
 def plot_trial(found: Found, title: str, path: Path) -> None:
-    """Draw a trial's readings, and what was fitted to them."""
+    """Draw a trial's readings and what was fitted to them, into a file."""
     from matplotlib.figure import Figure  # not before it is needed, as in `plots`
 
     figure = Figure(figsize=(7, 5), layout="constrained")

@@ -17,58 +17,63 @@ from rftsim.fit.columns import read_columns
 from rftsim.surface.triangles import EDGE_ON_DOUBLE, Array, Surface
 
 ANGLES: Final = ("beta", "gamma", "psi")
+"""Names of the angles of a plate and its motion."""
 ALPHA: Final = ("alpha_x", "alpha_y", "alpha_z")
+"""Names of the components of a plate's stress per depth."""
+SAND: Final = ("rho", "mu_int", "mu_surf")
+"""Names of what tells the sands of a campaign's plates apart."""
 
 
 class Plates(NamedTuple):
-    """Configurations of plates and what they felt."""
+    """Plates as they were set and moved, and the forces that they felt."""
 
     angles: Array
-    """beta, gamma, psi [deg], (n, 3)."""
+    """Angles beta, gamma and psi [deg], shape (n, 3)."""
     alpha: Array
-    """Force per area and depth [N/m^3], (n, 3)."""
+    """Force per area and depth [N/m^3], shape (n, 3)."""
     thickness: Array
-    """Over the plate's length [-], (n,); zero where it is unknown."""
+    """Thickness over the plate's length [-], shape (n,); zero where it is unknown."""
     depth: Array
-    """Of the leading face's centre over the plate's length [-], (n,)."""
+    """Depth of the leading face's centre over the plate's length [-], shape (n,)."""
 
     @property
     def n(self) -> int:
-        """How many."""
+        """The number of plates that were measured."""
         return len(self.alpha)
 
     def take(self, chosen: Any) -> "Plates":
-        """Some of them."""
+        """The plates that an index, a slice or a mask of NumPy chooses."""
         return Plates(*(column[chosen] for column in self))
 
 
 class Campaign(NamedTuple):
-    """The square plates of a campaign."""
+    """The square plates of a campaign that share one sand."""
 
     plates: Plates
+    """The plates themselves."""
     sand: dict[str, float]
-    """rho, mu_int and mu_surf of these plates."""
+    """Their rho [kg/m^3], mu_int [-] and mu_surf [-] by name."""
     flat: list[dict[str, float]]
     """Every flat plate pushed straight down, whatever its sand: mu_int, mu_surf, rho, alpha_z."""
     notes: list[str]
-    """What is not there yet, damaged, or not the same in all."""
+    """Sentences that say what is not there yet, damaged, or not the same in all."""
 
 
 class Faces(NamedTuple):
-    """The faces of plates that the sand presses on."""
+    """The faces of plates that the sand presses on, k of them."""
 
     row: "np.ndarray[tuple[int], np.dtype[np.int64]]"
-    """Which plate, (k,)."""
+    """Number of the plate that each is of, shape (k,)."""
     normal: Array
-    """Outward, (k, 3)."""
+    """Outward unit normals, shape (k, 3)."""
     motion: Array
-    """Direction of motion, (k, 3)."""
+    """Directions of motion, shape (k, 3)."""
     weight: Array
-    """Area and depth over those of the plate [-], (k,)."""
+    """Area times depth over that of the plate [-], shape (k,)."""
 
     @property
     def edge_on(self) -> "np.ndarray[tuple[int], np.dtype[np.bool_]]":
-        """Whether the face moves along itself, (k,)."""
+        """Whether each face moves along itself, shape (k,)."""
         found: np.ndarray[tuple[int], np.dtype[np.bool_]] = np.abs((self.normal * self.motion).sum(axis=1)) <= (
             EDGE_ON_DOUBLE
         )
@@ -76,7 +81,7 @@ class Faces(NamedTuple):
 
 
 def directions(angles: Array) -> tuple[Array, Array]:
-    """Normals of lower faces and directions of motion, (n, 3) each, of angles [deg], (n, 3)."""
+    """Normals of lower faces and directions of motion, shape (n, 3) each, from angles [deg], shape (n, 3)."""
     beta, gamma, psi = np.radians(angles).T
     m = np.stack([np.sin(beta) * np.cos(psi), np.sin(beta) * np.sin(psi), -np.cos(beta)], axis=1)
     v = np.stack([np.cos(gamma), np.zeros_like(gamma), -np.sin(gamma)], axis=1)
@@ -110,7 +115,7 @@ def leading_faces(plates: Plates) -> Faces:
 
 
 def at_unit_depth(normal: Array) -> Surface:
-    """One triangle for each normal, with its centre a metre deep."""
+    """A surface of one triangle for each normal, shape (k, 3), with its centre a metre deep."""
     aside = np.where(np.abs(normal[:, :1]) < 0.9, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
     a = np.cross(normal, aside)
     a /= np.linalg.norm(a, axis=1, keepdims=True)
@@ -120,7 +125,7 @@ def at_unit_depth(normal: Array) -> Surface:
 
 
 def read_csv(path: Path) -> Plates:
-    """Plates of a CSV with columns beta, gamma, psi [deg], alpha_x, alpha_y, alpha_z [N/m^3]; psi may be left out.
+    """The plates of a CSV with columns beta, gamma, psi [deg], alpha_x, alpha_y, alpha_z [N/m^3]; psi may be left out.
 
     Raises:
         RftsimError: The file is missing or a column is.
@@ -150,14 +155,8 @@ def read_campaign(folder: Path, wanted: Mapping[str, float]) -> Campaign:
     results, notes = _results(folder)
     sands: dict[tuple[float, ...], list[dict[str, Any]]] = {}
     for result in results:
-        sands.setdefault(tuple(float(result["plate"][name]) for name in ("rho", "mu_int", "mu_surf")), []).append(
-            result
-        )
-    fitting = [
-        key
-        for key in sands
-        if all(dict(zip(("rho", "mu_int", "mu_surf"), key, strict=True))[name] == x for name, x in wanted.items())
-    ]
+        sands.setdefault(tuple(float(result["plate"][name]) for name in SAND), []).append(result)
+    fitting = [key for key in sands if all(key[SAND.index(name)] == x for name, x in wanted.items())]
     if not fitting:
         there = "; ".join("rho {:g}, mu_int {:g}, mu_surf {:g}".format(*key) for key in sands) or "none"
         raise RftsimError(f"{folder} has no finished square plates in such a sand; it has {there}")
@@ -179,8 +178,12 @@ def read_campaign(folder: Path, wanted: Mapping[str, float]) -> Campaign:
         for result in results
         if result["plate"]["beta"] == 0.0 and result["plate"]["gamma"] == 90.0
     ]
-    sand = dict(zip(("rho", "mu_int", "mu_surf"), chosen, strict=True))
-    return Campaign(plates, sand, sorted(flat, key=lambda row: (row["mu_int"], row["mu_surf"])), notes)
+    return Campaign(
+        plates,
+        dict(zip(SAND, chosen, strict=True)),
+        sorted(flat, key=lambda row: (row["mu_int"], row["mu_surf"])),
+        notes,
+    )
 
 
 def _results(folder: Path) -> tuple[list[dict[str, Any]], list[str]]:

@@ -7,7 +7,12 @@ from rftsim.surface.triangles import Array
 
 
 def terms(x: Array, degree: int) -> Array:
-    """Monomials of x1, x2, x3, (k, 3), in the order of Table C.3 or C.4, (k, terms)."""
+    """Monomials of x1, x2 and x3 in the order of Table C.3 or C.4, shape (k, terms).
+
+    Args:
+        x: The projections x1, x2 and x3 of [Agarwal] eq. (5.17), shape (k, 3).
+        degree: Highest degree of a monomial, 3 or 4.
+    """
     powers = np.ones((degree + 1, *x.shape))
     for n in range(degree):
         powers[n + 1] = powers[n] * x

@@ -1,4 +1,4 @@
-"""What a fitted table is worth: residuals, error on plates that were held back, the source's table beside it."""
+"""The worth of a fitted table: residuals, error on plates that were held back, the source's table beside it."""
 
 import dataclasses
 from typing import Final, NamedTuple
@@ -21,10 +21,10 @@ PRIORS: Final = (0.0, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
 
 
 class Errors(NamedTuple):
-    """Of predicted alpha against plates."""
+    """The errors of a prediction of alpha against plates."""
 
     rms: tuple[float, float, float]
-    """Per component, over xi_n [-]."""
+    """Root of the mean square of each component, over xi_n [-]."""
     relative: float
     """Root of the sum of squares, over that of alpha [-]."""
 
@@ -33,11 +33,11 @@ class Worst(NamedTuple):
     """A plate that is fitted badly."""
 
     angles: list[float]
-    """beta, gamma, psi [deg]."""
+    """Its angles beta, gamma and psi [deg]."""
     alpha: list[float]
-    """Over xi_n [-]."""
+    """The alpha that was measured, over xi_n [-]."""
     fitted: list[float]
-    """Over xi_n [-]."""
+    """The alpha of the law, over xi_n [-]."""
     error: float
     """Length of the difference, over xi_n [-]."""
 
@@ -47,45 +47,49 @@ class Report:
     """A fitted table with its errors, all of the law as it is used: with |a_n| and the cap of eq. (5.6)."""
 
     generic: Generic
+    """The table and its scale."""
     settings: Settings
+    """The settings by which it was fitted."""
     plates: Plates
+    """The plates that it was fitted to."""
     mu_surf: float
+    """Friction of the plates [-]."""
     rank: int
-    """Coefficients that the plates determine without the prior."""
+    """Number of coefficients that the plates determine without the prior."""
     predicted: Array
-    """alpha of the law [N/m^3], (n, 3)."""
+    """The alpha of the law [N/m^3], shape (n, 3)."""
     predicted_held_back: Array
-    """alpha of laws fitted without the plate [N/m^3], (n, 3)."""
+    """The alpha of laws fitted without the plate [N/m^3], shape (n, 3)."""
     source: Errors
-    """Of the source's table, its scale fitted to the same plates."""
+    """Errors of the source's table, its scale fitted to the same plates."""
     power: float
     """Largest alpha_gen . v_hat at any angle, over xi_n [-]: where it is not positive, the law never adds energy."""
 
     @property
     def fitted(self) -> Errors:
-        """On the plates themselves."""
+        """The errors on the plates that it was fitted to."""
         return errors(self.predicted, self.plates, self.generic.xi_n)
 
     @property
     def held_back(self) -> Errors:
-        """On plates that the fit did not see."""
+        """The errors on plates that the fit did not see."""
         return errors(self.predicted_held_back, self.plates, self.generic.xi_n)
 
     @property
     def edge_on(self) -> int:
-        """Plates that move along their own faces, where the law jumps."""
+        """The number of plates that move along their own faces, where the law jumps."""
         m, v = directions(self.plates.angles)
         return int((np.abs((m * v).sum(axis=1)) <= EDGE_ON_DOUBLE).sum())
 
     def worst(self, count: int = 5) -> list[Worst]:
-        """The plates that are fitted worst."""
+        """The plates that are fitted worst, the worst first."""
         xi_n = self.generic.xi_n
         error = np.linalg.norm(self.predicted - self.plates.alpha, axis=1) / xi_n
         columns = (self.plates.angles, self.plates.alpha / xi_n, self.predicted / xi_n, error)
         return [Worst(*(column[i].tolist() for column in columns)) for i in np.argsort(-error)[:count]]
 
     def doubts(self) -> list[str]:
-        """What is doubtful, with numbers."""
+        """Sentences that say what of the fit is doubtful, with numbers."""
         found = []
         if self.rank < self.settings.unknowns:
             found.append(
@@ -107,12 +111,12 @@ class Report:
 
 
 def report(plates: Plates, settings: Settings, mu_surf: float, choose_prior: bool = False) -> Report:
-    """Fit, and say what the fit is worth.
+    """Fit a table to plates, and say what the fit is worth.
 
     Args:
-        plates: What was measured.
-        settings: How to fit.
-        mu_surf: Friction of the plates, for the law's cap.
+        plates: The plates that were measured.
+        settings: The settings of the fit.
+        mu_surf: Friction of the plates [-], for the law's cap.
         choose_prior: Take from PRIORS the one with which held-back plates are predicted best.
 
     Raises:
@@ -146,14 +150,14 @@ def _of_source(plates: Plates, settings: Settings) -> Errors:
 
 
 def errors(predicted: Array, plates: Plates, xi_n: float) -> Errors:
-    """Of predicted alpha, (n, 3)."""
+    """The errors of a predicted alpha [N/m^3], shape (n, 3), against plates."""
     off = predicted - plates.alpha
     x, y, z = (np.sqrt((off**2).mean(axis=0)) / xi_n).tolist()
     return Errors((x, y, z), float(np.sqrt((off**2).sum() / (plates.alpha**2).sum())))
 
 
 def held_back(plates: Plates, settings: Settings) -> Array:
-    """Stress per depth of each plate by a law that was fitted to the plates outside of its part, (n, 3)."""
+    """Stress per depth of each plate by a law fitted to the plates outside of its part [N/m^3], shape (n, 3)."""
     count = plates.n
     part = np.random.default_rng(0).permutation(count) % min(FOLDS, count)
     found = np.empty((count, 3))
@@ -164,7 +168,7 @@ def held_back(plates: Plates, settings: Settings) -> Array:
 
 
 def predict(table: tuple[Term, ...], xi_n: float, mu_surf: float, plates: Plates) -> Array:
-    """Stress per depth of plates by the law with a table [N/m^3], (n, 3): that on every face that leads."""
+    """Stress per depth of plates by the law with a table [N/m^3], shape (n, 3): that on every face that leads."""
     law, sand = fitted_law(table), Sand(xi_n=xi_n, mu_surf=min(mu_surf, 1e9))
     faces = leading_faces(plates)
     alpha = np.zeros((plates.n, 3))

@@ -15,32 +15,34 @@ from rftsim.sand.medium import ALPHA_Z_PLATE, Sand
 from rftsim.surface.triangles import Array
 
 UNITS: Final = {"xi_n": "N/m^3", "zeta": "N/m^3", "K": "N/m", "lambda_": "-", "mu_surf": "-"}
+"""Units of what trials estimate, by name."""
 
 
 class Found(NamedTuple):
-    """What a trial says of the sand."""
+    """The parameters of a sand that a trial tells, and how well the trial fits them."""
 
     estimates: dict[str, Estimate]
-    """By name; SI."""
+    """Estimates by name, in the units of `UNITS`."""
     parameters: dict[str, float]
-    """Those of `Sand` that follow."""
+    """Parameters of `Sand` that follow, by name."""
     x: Array
-    """What the fitted force is proportional to, or for a drag trial the speed, (n,)."""
+    """The quantity that the fitted force is proportional to, or for a drag trial the speed, shape (n,)."""
     measured: Array
-    """[N], (n,)."""
+    """Force that was measured [N], shape (n,)."""
     fitted: Array
-    """[N], (n,)."""
+    """Force that the estimates give [N], shape (n,)."""
     labels: tuple[str, str]
-    """Of x and of the force."""
+    """Labels of x and of the force, with units."""
     doubts: list[str]
+    """Sentences that say what is doubtful, with numbers."""
 
 
 def pushed(path: Path, area: float | None) -> Found:
-    """xi_n of a flat plate pushed straight down, [Agarwal] eq. (5.21): F = 0.87574 xi_n A z.
+    """The xi_n of a flat plate pushed straight down, [Agarwal] eq. (5.21): F = 0.87574 xi_n A z.
 
     Args:
         path: CSV with columns depth [m] and force [N]; area [m^2] and test (a number) where there are several.
-        area: Of the plate [m^2], where there is no such column.
+        area: Area of the plate [m^2], where there is no such column.
     """
     table = _read(path, ("depth", "force"), area)
     x, force, tests = table["area"] * table["depth"], table["force"], table.get("test")
@@ -58,12 +60,12 @@ def pushed(path: Path, area: float | None) -> Found:
 
 
 def dragged(path: Path, area: float | None, rho_c: float) -> Found:
-    """K and lambda of an upright plate dragged level, [Agarwal] section 4.6: F = K z + lambda rho_c A v^2.
+    """The K and lambda of an upright plate dragged level, [Agarwal] section 4.6: F = K z + lambda rho_c A v^2.
 
     Args:
         path: CSV with columns depth (of the plate's centre) [m], speed [m/s] and force (along the motion) [N]; area
             [m^2] and test where there are several.
-        area: Of the plate [m^2], where there is no such column.
+        area: Area of the plate [m^2], where there is no such column.
         rho_c: Density of the sand [kg/m^3].
     """
     if not rho_c > 0.0:
@@ -88,7 +90,7 @@ def dragged(path: Path, area: float | None, rho_c: float) -> Found:
 
 
 def slid(path: Path) -> Found:
-    """mu_surf of a plate that slides through sand: tangential over normal force, the cap of [Agarwal] eq. (5.6).
+    """The mu_surf of a plate that slides through sand: tangential over normal force, the cap of [Agarwal] eq. (5.6).
 
     Args:
         path: CSV with columns normal and tangential [N], or force_x, force_z [N] and beta [deg], the tilt of the plate,
@@ -143,7 +145,7 @@ def _upright(law: str) -> float:
 
 
 def sand_line(parameters: Mapping[str, object]) -> str:
-    """The call that makes this sand."""
+    """The call of `Sand` that makes the sand of these parameters, as text."""
     shown = ", ".join(
         f"{key}={f'{value:.4g}' if isinstance(value, float) else repr(value)}" for key, value in parameters.items()
     )

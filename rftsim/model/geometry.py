@@ -4,6 +4,7 @@ import mujoco
 import numpy as np
 
 from rftsim.errors import SceneError
+from rftsim.model.draft import TEMPORARY
 from rftsim.surface import solids
 from rftsim.surface.triangles import EDGE_ON_SINGLE, Array, Faces, Surface, joined, make_surface
 
@@ -39,19 +40,19 @@ def body_surface(
 
 
 def is_colliding(model: mujoco.MjModel, geom: int) -> bool:
-    """Whether a geom can collide with anything."""
+    """Whether a geom can collide with anything at all."""
     return bool(model.geom_contype[geom] or model.geom_conaffinity[geom])
 
 
 def geom_label(model: mujoco.MjModel, geom: int) -> str:
-    """How messages name a geom."""
+    """The words by which messages name a geom of a compiled model or draft."""
     body = model.body(model.geom_bodyid[geom]).name
-    name = model.geom(geom).name.partition("rftsim-geom:")[0]
+    name = model.geom(geom).name.partition(TEMPORARY)[0]
     return f"geom {name or geom} of body {body or model.geom_bodyid[geom]}"
 
 
 def geom_triangles(model: mujoco.MjModel, geom: int) -> tuple[Array, Faces]:
-    """Vertices [m], (nvert, 3), and faces, (nface, 3), of a geom in its own frame.
+    """Vertices [m], shape (nvert, 3), and faces, shape (nface, 3), of a geom in its own frame.
 
     Raises:
         SceneError: The geom has no bounded surface: planes, height fields and distance fields.

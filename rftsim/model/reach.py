@@ -1,4 +1,4 @@
-"""Where a model's joints let a body go: orientations, motions, and how near to the sand it can come."""
+"""The reach of a model's bodies as their joints let them go: orientations, motions, nearness to the sand."""
 
 import math
 from typing import Final
@@ -22,7 +22,7 @@ def sampled_reach(model: mujoco.MjModel, body: int, surface: Surface, seed: int)
         model: Compiled.
         body: The body's id.
         surface: Its surface.
-        seed: Of the joint positions.
+        seed: Seed of the joint positions.
     """
     rng = np.random.default_rng(seed)
     data = mujoco.MjData(model)
@@ -76,7 +76,7 @@ def stays_in_plane(model: mujoco.MjModel, body: int, plane: Array) -> bool:
     return True
 
 
-def clearance(model: mujoco.MjModel, body: int, surface: Surface, free_surface: FreeSurface) -> float:
+def clearance(model: mujoco.MjModel, body: int, surface: Surface, terrain: FreeSurface) -> float:
     """A height over the sand that a body cannot come below, by its tree and its joints' ranges [m]; or -inf.
 
     Along the way from the world, a slide lowers what hangs on it by its range, and a hinge that is not upright, or a
@@ -85,8 +85,8 @@ def clearance(model: mujoco.MjModel, body: int, surface: Surface, free_surface: 
     chain = [body]
     while chain[-1] != 0:
         chain.append(int(model.body_parentid[chain[-1]]))
-    height = -free_surface.offset
-    tilt: Array | None = np.array(free_surface.normal)
+    height = -float(terrain.depth(np.zeros(3)))
+    tilt: Array | None = np.array(terrain.normal)
     """Up in the frame so far; None where a joint may have turned it any way."""
 
     def along(vector: Array) -> float:

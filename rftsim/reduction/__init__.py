@@ -1,1 +1,1 @@
-"""The fewest elements that keep a body's wrench."""
+"""Surfaces reduced to the fewest elements that keep a body's wrench."""

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from rftsim.surface.triangles import Array, Surface
 
 Labels = NDArray[np.intp]
+"""The cluster of each triangle, 0 to n - 1, shape (ntri,)."""
 
 TURN: Final = 0.25
 """How far two normals' difference counts against two centroids', which count in body sizes; found by trial."""
@@ -21,23 +22,23 @@ ROUNDS: Final = 2
 
 
 def features(surface: Surface, nearness: Array) -> Array:
-    """Points whose distance says how unlike two triangles are to the sand, (ntri, 6).
+    """Points whose distance says how unlike two triangles are to the sand, shape (ntri, 6).
 
     Args:
         surface: The triangles.
-        nearness: Symmetric, (3, 3); how far two centroids lie apart to the sand is |nearness (c1 - c2)|.
+        nearness: Symmetric matrix, shape (3, 3); to the sand two centroids lie |nearness (c1 - c2)| apart.
     """
     return np.hstack([surface.centres @ nearness / surface.size, TURN * surface.normals])
 
 
 def split(labels: Labels, chosen: Labels, points: Array, weights: Array) -> Labels:
-    """Labels after each chosen cluster was cut in two across its longest principal axis, where it can be.
+    """The labels after each chosen cluster was cut in two across its longest principal axis, where it can be.
 
     Args:
-        labels: The cluster of each point, 0 to n - 1, (npoint,).
-        chosen: Clusters.
-        points: (npoint, k).
-        weights: (npoint,).
+        labels: Cluster of each point, 0 to n - 1, shape (npoint,).
+        chosen: Clusters to cut.
+        points: Places of the points, shape (npoint, k).
+        weights: Weight of each point, shape (npoint,).
     """
     labels = labels.copy()
     order = np.argsort(labels, kind="stable")
@@ -55,7 +56,7 @@ def split(labels: Labels, chosen: Labels, points: Array, weights: Array) -> Labe
 
 
 def settled(labels: Labels, points: Array, weights: Array) -> Labels:
-    """Labels after each point went to the cluster of the nearest mean, ROUNDS times."""
+    """The labels after each point went to the cluster of the nearest mean, ROUNDS times; arguments as of `split`."""
     from scipy.spatial import cKDTree  # not at start-up, which it would slow by half a second
 
     for _ in range(ROUNDS):
@@ -66,7 +67,7 @@ def settled(labels: Labels, points: Array, weights: Array) -> Labels:
 
 
 def merged(surface: Surface, labels: Labels) -> Surface:
-    """One facet for each cluster: its area vector, at its centre of area, shifted so that the volume stays.
+    """The surface of one facet for each cluster: its area vector, at its centre of area, shifted to keep the volume.
 
     A facet is kept as an equilateral triangle of its centroid, normal and area. Those without an area, which hold both
     sides of a plate, are kept too, as triangles of next to no area.

@@ -10,7 +10,7 @@ held against other poses, depths and motions, too, where twice the tolerance is 
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -42,45 +42,45 @@ ASIDE: Final = 0.05
 
 
 class Reach(NamedTuple):
-    """Orientations that a body can take, and how it can move there."""
+    """The orientations that a body can take, and the motions that it can make there."""
 
     rotations: Array
-    """To the world frame, (n, 3, 3)."""
+    """Rotations from the body to the world frame, shape (n, 3, 3)."""
     motions: Array
-    """Projections of a motion onto those that the joints allow, (n, 6, 6): velocity of the body's centre, then angular
-    velocity times half the body's size; world frame."""
+    """Projections of a motion onto those that the joints allow, shape (n, 6, 6): velocity of the body's centre, then
+    angular velocity times half the body's size; world frame."""
 
 
 class Samples(NamedTuple):
-    """Poses and motions."""
+    """The poses and motions at which a body's wrench is compared, n of them."""
 
     depth: Array
-    """Of the lowest corner, over the body's size, (n,)."""
+    """Depth of the lowest corner over the body's size [-], shape (n,)."""
     position: Array
-    """Of the body's origin [m], (n, 3)."""
+    """Position of the body's origin [m], shape (n, 3)."""
     rotation: Array
-    """To the world frame, (n, 3, 3)."""
+    """Rotation from the body to the world frame, shape (n, 3, 3)."""
     velocity: Array
-    """Of the body's origin [m/s], (n, 3)."""
+    """Velocity of the body's origin [m/s], shape (n, 3)."""
     omega: Array
-    """[rad/s], (n, 3)."""
+    """Angular velocity, world frame [rad/s], shape (n, 3)."""
 
 
 class Economy(NamedTuple):
-    """What a body's surface was reduced to."""
+    """The numbers of a body's surface before and after it was reduced, and its errors."""
 
     triangles: int
-    """Of the whole surface."""
+    """Number of triangles of the whole surface."""
     elements: int
-    """That the sand feels."""
+    """Number of elements that stand for them."""
     error: float
-    """Largest over the samples."""
+    """Largest error over the samples [-]."""
     held_back: float
-    """Largest over the poses, depths and motions that it is checked at."""
+    """Largest error over the poses, depths and motions that it is checked at [-]."""
 
 
 def free_reach(seed: int) -> Reach:
-    """Any orientation and any motion."""
+    """The reach of a body that is free: any orientation, drawn by a seed, and any motion."""
     from scipy.spatial.transform import Rotation  # not at start-up, see `facets`
 
     rotations = Rotation.random(POSES, random_state=np.random.default_rng(seed)).as_matrix()
@@ -88,23 +88,23 @@ def free_reach(seed: int) -> Reach:
 
 
 def middle(surface: Surface) -> Array:
-    """Centre of a surface's box [m], (3,)."""
+    """Centre of the box around a surface, body frame [m], shape (3,)."""
     low, high = surface.corners.min(axis=0), surface.corners.max(axis=0)
     return 0.5 * (low + high)  # type: ignore[no-any-return]
 
 
 def draw(surface: Surface, sand: Array, reach: Reach, depths: tuple[float, ...], seed: int) -> Samples:
-    """Each orientation at each depth with MOTIONS motions.
+    """Samples of each orientation of a body at each depth, with MOTIONS motions each.
 
     Near the translations along the three axes and the rotations about them, both ways, and others drawn at random, as
     far as the joints allow; at speeds of 0.1 to 1 sqrt(g L), which only the dynamic laws notice.
 
     Args:
-        surface: The body's.
-        sand: Packed.
-        reach: Its orientations and motions.
-        depths: Of the lowest corner, over the body's size.
-        seed: Of what is drawn.
+        surface: The body's surface.
+        sand: Packed sand.
+        reach: Orientations and motions of the body.
+        depths: Depths of the lowest corner, over the body's size [-].
+        seed: Seed of the motions.
     """
     rng = np.random.default_rng(seed)
     size, centre, up, g = surface.size, middle(surface), sand[3:6], sand[15]
@@ -113,20 +113,24 @@ def draw(surface: Surface, sand: Array, reach: Reach, depths: tuple[float, ...],
         lowest = float((surface.corners @ rotation.T @ up).min())
         for depth in depths:
             position = (sand[6] - lowest - depth * size) * up
-            axes = np.vstack([np.eye(6), -np.eye(6)]) + rng.normal(scale=ASIDE, size=(12, 6))
-            wanted = np.vstack([axes, rng.normal(size=(MOTIONS - 12, 6))])
-            for motion in wanted / np.linalg.norm(wanted, axis=1, keepdims=True) @ allowed.T:
-                length = np.linalg.norm(motion)
-                if length < 0.1:  # what is left of a motion that the joints forbid
-                    continue
-                motion = motion / length * math.sqrt(g * size) * rng.uniform(0.1, 1.0)
+            for motion in _motions(allowed, math.sqrt(g * size), rng):
                 omega = motion[3:] / (size / 2)
                 rows.append((depth, position, rotation, motion[:3] - np.cross(omega, rotation @ centre), omega))
     return Samples(*(np.array(column) for column in zip(*rows, strict=True)))
 
 
+def _motions(allowed: Array, fastest: float, rng: np.random.Generator) -> Iterator[Array]:
+    """Allowed motions of a tenth of the fastest speed to all of it, (6,) each, those near the axes first."""
+    axes = np.vstack([np.eye(6), -np.eye(6)]) + rng.normal(scale=ASIDE, size=(12, 6))
+    wanted = np.vstack([axes, rng.normal(size=(MOTIONS - 12, 6))])
+    for motion in wanted / np.linalg.norm(wanted, axis=1, keepdims=True) @ allowed.T:
+        length = np.linalg.norm(motion)
+        if length >= 0.1:  # less is what is left of a motion that the joints forbid
+            yield motion / length * fastest * rng.uniform(0.1, 1.0)
+
+
 def wrenches(surface: Surface, sand: Array, samples: Samples) -> Array:
-    """Force, and moment about the body's centre over half its size, (n, 6) [N]."""
+    """Force, and moment about the body's centre over half its size, at each sample [N], shape (n, 6)."""
     body = layout.pack_surface(surface)
     found = evaluate.wrenches(sand, body, *samples[1:])
     arm = samples.rotation @ middle(surface)
@@ -135,7 +139,7 @@ def wrenches(surface: Surface, sand: Array, samples: Samples) -> Array:
 
 
 def errors(whole: Array, reduced: Array, depth: Array) -> Array:
-    """Error at each sample, (n,); see above."""
+    """Error of the reduced surface's wrench at each sample [-], shape (n,); see the head of this module."""
     return _larger(whole - reduced) / _scales(whole, depth)
 
 
@@ -145,7 +149,7 @@ def _larger(wrench: Array) -> Array:
 
 
 def _scales(whole: Array, depth: Array) -> Array:
-    """What the error at each sample is measured by [N], (n,)."""
+    """The wrench that the error at each sample is a share of [N], (n,)."""
     scale = {d: _larger(whole[depth == max(d, SHALLOW)]).max() for d in np.unique(depth)}
     found: Array = np.maximum([scale[d] for d in depth], 1e-300)
     return found
@@ -154,16 +158,16 @@ def _scales(whole: Array, depth: Array) -> Array:
 def reduced(
     surface: Surface, sand: Array, tolerance: float, reach: Callable[[int], Reach] = free_reach
 ) -> tuple[Surface, Economy]:
-    """The surface in the fewest facets found that keep the error under a tolerance; itself where none do.
+    """The surface in the fewest facets found that keep the error under a tolerance, itself where none do.
 
     From a few facets on, those are split whose own force errs most in poses and motions that are drawn anew for each
     attempt. So neither those that decide nor those held back have been seen.
 
     Args:
-        surface: A body's.
-        sand: Packed; its law is the one that is kept.
-        tolerance: Largest error.
-        reach: Orientations and motions of the body, by a seed.
+        surface: The body's surface.
+        sand: Packed sand; its law is the one that is kept.
+        tolerance: Largest error [-].
+        reach: Gives orientations and motions of the body, by a seed.
     """
     surface = surface.clustered(BLOCK)
     areas = surface.areas

@@ -1,4 +1,4 @@
-"""The lowest law that serves a scene: what its joints and its speed allow, with numbers. Nothing is changed."""
+"""Advice on the law of a scene: the lowest that its joints and its speed allow, with numbers. Nothing is changed."""
 
 import math
 from typing import Final, NamedTuple
@@ -20,16 +20,18 @@ class Advice(NamedTuple):
     """A law for a scene, its own or another, and why."""
 
     law: str
+    """Name of the law."""
     reason: str
+    """Why this law, with numbers."""
 
 
 def advise(model: mujoco.MjModel, bed: Bed, speed: float | None = None) -> list[Advice]:
-    """What the scene allows and asks of its law: plane or space, quasi-static or dynamic.
+    """The laws that a scene allows and asks for: in plane or space, and quasi-static or dynamic.
 
     Args:
         model: The compiled model.
         bed: Its sand.
-        speed: Of the bodies that feel it [m/s]; by default each one's at the start: the first keyframe's.
+        speed: Speed of the bodies that feel the sand [m/s]; by default each one's at the start: the first keyframe's.
     """
     bodies = [model.body(name).id for name in bed.surfaces]
     flat = [axis for axis, normal in PLANES.items() if all(stays_in_plane(model, body, normal) for body in bodies)]

@@ -21,14 +21,15 @@ _CHECKS = 10
 
 
 class History(NamedTuple):
-    """What was measured, at evenly spaced times; arrays of shape (n,) unless said."""
+    """The measurements of a run at evenly spaced times, arrays of shape (n,) unless said otherwise."""
 
     time: Array
-    """[s]."""
+    """Simulated time [s]."""
     speed: Array
     """Horizontal speed of the measured body, along x [m/s]."""
     sinkage: Array
-    """Of the measured body [m]: outer radius less axle height for a wheel, depth of the deepest corner otherwise."""
+    """Sinkage of the measured body [m]: outer radius less axle height for a wheel, otherwise depth of the deepest
+    corner."""
     rate: Array
     """Angular velocity of the measured body about y [rad/s]."""
     force: Array
@@ -38,33 +39,35 @@ class History(NamedTuple):
 
 
 class Steady(NamedTuple):
-    """Means over the last 40 % of a run."""
+    """The means over the last 40 % of a run, its steady state."""
 
     speed: float
-    """[m/s]."""
+    """Horizontal speed of the measured body, along x [m/s]."""
     sinkage: float
-    """[m]."""
+    """Sinkage of the measured body [m], see `History`."""
     slip: float | None
     """1 - v / (R omega) of a wheel; None elsewhere, or where it does not turn."""
     rate: float
-    """[rad/s]."""
+    """Angular velocity of the measured body about y [rad/s]."""
 
 
 class Run(NamedTuple):
-    """A finished run."""
+    """A finished run: its measurements and how far they can be trusted."""
 
     history: History
+    """The measurements on the way."""
     steady: Steady
+    """Their means at the end."""
     realtime_factor: float
     """Simulated over elapsed time, of the steps alone."""
     doubts: tuple[str, ...]
     """Where the run left the theory's range, with numbers."""
     last: mujoco.MjData
-    """The data at the end."""
+    """MuJoCo's data at the end."""
 
 
 class RunError(RftsimError):
-    """A run that MuJoCo could not continue."""
+    """Error of a run that MuJoCo could not continue, because it diverged."""
 
 
 def run(staged: Staged, observe: Callable[[mujoco.MjData], Any] | None = None) -> Run:
@@ -89,14 +92,12 @@ def run(staged: Staged, observe: Callable[[mujoco.MjData], Any] | None = None) -
 
 
 def steps(staged: Staged) -> Generator[mujoco.MjData, None, Run]:
-    """The run as an iterator over its samples, whose return value is the `Run`."""
-    model, bed, measured = staged.model, staged.bed, staged.measured
+    """The run of a staged scene as an iterator over the data at its samples, whose return value is the `Run`."""
+    model = staged.model
     data = mujoco.MjData(model)
     if model.nkey:
         mujoco.mj_resetDataKeyframe(model, data, 0)
     mujoco.mj_forward(model, data)
-    body = model.body(measured.body).id
-    corners = bed.surfaces[measured.body].corners
     total = max(round(staged.duration / model.opt.timestep), 1)
     every = max(total // SAMPLES, 1)
     rows: list[tuple[Any, ...]] = []
@@ -107,37 +108,28 @@ def steps(staged: Staged) -> Generator[mujoco.MjData, None, Run]:
         mujoco.mj_step(model, data, nstep=min(every, total - first))
         elapsed += time.perf_counter() - started
         _refuse_warnings(data)
-        rows.append(
-            _row(model, data, body, measured.wheel_radius, corners, bed.free_surface.normal, bed.free_surface.offset)
-        )
+        rows.append(_row(staged, data))
         if (first // every) % max(SAMPLES // _CHECKS, 1) == 0:
-            checks += validity(model, data, bed.sand.grain_diameter)
+            checks += validity(model, data, staged.bed.sand.grain_diameter)
         yield data
     columns = [np.array(column) for column in zip(*rows, strict=True)]
     history = History(*columns)
-    doubts = _worst(checks)
-    spent = work(model, data)
-    if spent.unsolved:
-        doubts.append(
-            f"{spent.unsolved} equations of the implicit force in {spent.steps} steps were not solved to their "
-            f"tolerance: compare with a shorter timestep than {model.opt.timestep:g} s"
-        )
-    steady = _steady(history, measured.wheel_radius)
-    return Run(history, steady, staged.duration / elapsed, tuple(dict.fromkeys(doubts)), data)
+    doubts = tuple(dict.fromkeys([*_worst(checks), *_unsolved(model, data)]))
+    return Run(history, _steady(history, staged.measured.wheel_radius), staged.duration / elapsed, doubts, data)
 
 
-def _row(
-    model: mujoco.MjModel, data: mujoco.MjData, body: int, radius: float | None, corners: Array, up: Any, offset: float
-) -> tuple[Any, ...]:
+def _row(staged: Staged, data: mujoco.MjData) -> tuple[Any, ...]:
+    """The measurements of one moment, in the order of `History`."""
+    model, terrain, measured = staged.model, staged.bed.terrain, staged.measured
+    body = model.body(measured.body).id
     wrench = wrenches(model, data)
     velocity = np.empty(6)
     mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_XBODY, body, velocity, 0)
-    height = float(np.dot(up, data.xpos[body])) - offset
-    if radius is None:
-        lowest = float((corners @ data.xmat[body].reshape(3, 3).T @ np.asarray(up)).min())
-        sinkage = -(height + lowest)
-    else:
-        sinkage = radius - height
+    below = measured.wheel_radius
+    if below is None:
+        corners = staged.bed.surfaces[measured.body].corners
+        below = -float((corners @ data.xmat[body].reshape(3, 3).T @ np.asarray(terrain.normal)).min())
+    sinkage = below + float(terrain.depth(data.xpos[body]))
     return data.time, velocity[3], sinkage, velocity[1], wrench.force[body].copy(), float(wrench.power.sum())
 
 
@@ -154,6 +146,17 @@ def _refuse_warnings(data: mujoco.MjData) -> None:
             raise RunError(
                 f"the simulation diverged by {data.time:.4g} s ({kind[7:].lower()}): take a smaller timestep"
             )
+
+
+def _unsolved(model: mujoco.MjModel, data: mujoco.MjData) -> list[str]:
+    """The doubt about equations of the implicit force that were not solved, if any."""
+    spent = work(model, data)
+    if not spent.unsolved:
+        return []
+    return [
+        f"{spent.unsolved} equations of the implicit force in {spent.steps} steps were not solved to their "
+        f"tolerance: compare with a shorter timestep than {model.opt.timestep:g} s"
+    ]
 
 
 def _worst(checks: list[Validity]) -> list[str]:

@@ -15,10 +15,11 @@ from rftsim.sand.presets import PRESETS
 from rftsim.surface.triangles import Wheel, load_surface
 
 Settings = Mapping[str, float | str]
+"""Settings of a scene by name."""
 
 
 class Measured(NamedTuple):
-    """What a scene is measured by."""
+    """The body that a scene is measured by, and how."""
 
     body: str
     """The body whose speed and sinkage are meant."""
@@ -28,36 +29,37 @@ class Measured(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class Scene:
-    """A shipped scene.
-
-    Attributes:
-        says: What it is.
-        settings: What `--set` changes, with defaults.
-        build: Makes the model from the settings.
-        sand: Its sand.
-        law: Its law.
-        duration: How long it runs [s].
-        wheel: Parameters of its wheel, if it has one, from the settings.
-        structural: Whether the free surface drops behind the wheel under the dynamic laws.
-    """
+    """A scene that comes with rftsim, as its model is built from its settings."""
 
     says: str
+    """A line that says what the scene is."""
     settings: Settings
+    """The settings that `--set` changes, with their defaults."""
     build: Callable[[Settings], mujoco.MjSpec]
+    """Makes the model from the settings."""
     sand: Sand
+    """The medium, where no other is asked for."""
     law: str
+    """Name of the law, where no other is asked for."""
     duration: float
+    """How long it runs, where nothing else is asked for [s]."""
     wheel: Callable[[Settings], wheels.WheelParameters] | None = None
+    """Gives the parameters of its wheel from the settings; None where it has no wheel."""
     structural: bool = False
+    """Whether the free surface drops behind the wheel under the dynamic laws."""
 
 
 class Staged(NamedTuple):
-    """A scene ready to run."""
+    """A scene with its sand, compiled and ready to run."""
 
     model: mujoco.MjModel
+    """Compiled, with sand."""
     bed: Bed
+    """The sand, and what feels it."""
     measured: Measured
+    """The body that it is measured by."""
     duration: float
+    """How long it runs [s]."""
 
 
 def _grouser_wheel(settings: Settings) -> wheels.WheelParameters:
@@ -95,6 +97,11 @@ def _intruder(settings: Settings) -> mujoco.MjSpec:
 
 
 POPPY: Final = PRESETS["poppy-seeds"]
+"""The sand of the shipped scenes, and of model files where no other is asked for."""
+FILE_LAW: Final = "rft3d"
+"""The law of model files where no other is asked for."""
+FILE_DURATION: Final = 4.0
+"""How long model files run where nothing else is asked for [s]."""
 
 SCENES: Final[Mapping[str, Scene]] = {
     "grouser-wheel": _wheel_scene(
@@ -149,52 +156,65 @@ def stage(
 
     Args:
         name: A scene's name, or the path of an MJCF file.
-        sand: Instead of the scene's.
-        law: Instead of the scene's.
+        sand: Sand instead of the scene's.
+        law: Law instead of the scene's.
         settings: Changes of the scene's settings.
-        timestep: Instead of the model's [s].
-        duration: Instead of the scene's [s].
-        **options: Those of `add_sand`.
+        timestep: Time step instead of the model's [s].
+        duration: Duration instead of the scene's [s].
+        **options: Further options of `add_sand`.
 
     Raises:
         RftsimError: No such scene, file or setting, or the scene cannot have sand.
     """
-    scene = SCENES.get(name)
-    if scene is None and not Path(name).is_file():
-        raise SceneError(f"no scene or model file {name!r}; scenes are {', '.join(SCENES)}")
-    wheel = None
+    scene, wheel = SCENES.get(name), None
     if scene is None:
-        if settings:
-            raise SceneError(f"{name} is a model file and has no settings; --set is for {', '.join(SCENES)}")
-        spec = read_spec(name)
+        spec = _read(name, settings or {})
     else:
-        chosen = _chosen(name, scene.settings, settings or {})
-        try:
-            spec = scene.build(chosen)
-            wheel = scene.wheel(chosen) if scene.wheel else None
-        except ValueError as error:
-            raise SceneError(f"{name}: {error}") from error
-        if wheel is not None:
-            options.setdefault("max_edge", 2 * wheel.width)  # as fine as the outline was asked to be
-            if scene.structural:
-                options["wheels"] = {wheels.WHEEL: Wheel((0, 1, 0), (0, 0, 0), wheel.outer_radius)}
-    for label, value in (("timestep", timestep), ("duration", duration)):
-        if value is not None and not 0.0 < value < float("inf"):
-            raise SceneError(f"the {label} must be positive, not {value}")
+        spec, wheel = _built(name, scene, _chosen(name, scene.settings, settings or {}))
+    _check_positive("timestep", timestep)
+    _check_positive("duration", duration)
     if timestep is not None:
         spec.option.timestep = timestep
-    fallback = scene or Scene("", {}, lambda _: spec, POPPY, "rft3d", 4.0)
-    bed = add_sand(spec, sand if sand is not None else fallback.sand, law or fallback.law, **options)
-    model = spec.compile()
+    if wheel is not None:
+        options.setdefault("max_edge", 2 * wheel.width)  # as fine as the outline was asked to be
+        if scene is not None and scene.structural:
+            options["wheels"] = {wheels.WHEEL: Wheel((0, 1, 0), (0, 0, 0), wheel.outer_radius)}
+    if sand is None:
+        sand = scene.sand if scene else POPPY
+    bed = add_sand(spec, sand, law or (scene.law if scene else FILE_LAW), **options)
     if scene is None:
         measured = Measured(next(iter(bed.surfaces)), None)
+    elif wheel is None:
+        measured = Measured(intruder.INTRUDER, None)
     else:
-        body = wheels.WHEEL if wheel else intruder.INTRUDER
-        measured = Measured(body, wheel.outer_radius if wheel else None)
-    return Staged(model, bed, measured, duration or fallback.duration)
+        measured = Measured(wheels.WHEEL, wheel.outer_radius)
+    return Staged(spec.compile(), bed, measured, duration or (scene.duration if scene else FILE_DURATION))
+
+
+def _read(name: str, settings: Mapping[str, str]) -> mujoco.MjSpec:
+    """The model of a file, which has no settings."""
+    if not Path(name).is_file():
+        raise SceneError(f"no scene or model file {name!r}; scenes are {', '.join(SCENES)}")
+    if settings:
+        raise SceneError(f"{name} is a model file and has no settings; --set is for {', '.join(SCENES)}")
+    return read_spec(name)
+
+
+def _built(name: str, scene: Scene, chosen: Settings) -> tuple[mujoco.MjSpec, wheels.WheelParameters | None]:
+    """The model of a scene, and the parameters of its wheel if it has one."""
+    try:
+        return scene.build(chosen), scene.wheel(chosen) if scene.wheel else None
+    except ValueError as error:
+        raise SceneError(f"{name}: {error}") from error
+
+
+def _check_positive(label: str, value: float | None) -> None:
+    if value is not None and not 0.0 < value < float("inf"):
+        raise SceneError(f"the {label} must be positive, not {value}")
 
 
 def _chosen(name: str, defaults: Settings, changes: Mapping[str, str]) -> Settings:
+    """The settings of a scene after changes, each of the type of its default."""
     chosen = dict(defaults)
     for key, value in changes.items():
         if key not in defaults:

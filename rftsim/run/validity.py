@@ -10,25 +10,31 @@ from rftsim.law.layout import SAND_FIELDS
 from rftsim.model.readout import body_velocities, instances, tractions
 
 FROUDE_LIMIT = 0.4
+"""Froude number from which on inertial terms count [-]."""
 INERTIAL_LIMIT = 0.1
+"""Inertial number above which grains no longer flow densely [-]."""
 DEPTH_LIMIT = 2.0
+"""Depth over size beyond which the laws overestimate stress [-]."""
 
 
 class Validity(NamedTuple):
-    """Dimensionless numbers of one body in the sand; zero where it does not touch it."""
+    """The dimensionless numbers of one body in the sand, zero where it does not touch it."""
 
     body: str
+    """Name of the body."""
     froude: float
-    """v / sqrt(g L): v the mean speed of the active triangles, L the body's size. Without inertial terms below 0.4."""
+    """Froude number v / sqrt(g L), v the mean speed of the active triangles, L the body's size. Without inertial terms
+    below 0.4."""
     inertial: float
-    """(v / L) d / sqrt(g z), z the mean active depth, d the grain diameter. Below 0.1; NaN if unknown."""
+    """Inertial number (v / L) d / sqrt(g z), z the mean active depth, d the grain diameter. Below 0.1; NaN if
+    unknown."""
     depth: float
-    """Largest active depth over L. Of order one."""
+    """Largest depth of an active triangle over L. Of order one."""
     dynamic: bool
     """Whether the law has inertial terms."""
 
     def doubts(self) -> list[str]:
-        """What is out of range, with numbers."""
+        """Sentences that say what of the body is out of range, with numbers."""
         found = []
         if self.froude > FROUDE_LIMIT and not self.dynamic:
             found.append(f"Froude number {self.froude:.2g} > {FROUDE_LIMIT}: use a dynamic law")
@@ -40,7 +46,13 @@ class Validity(NamedTuple):
 
 
 def validity(model: mujoco.MjModel, data: mujoco.MjData, grain_diameter: float | None = None) -> list[Validity]:
-    """The numbers of every body that feels sand, at the positions and velocities of the last mj_forward or mj_step."""
+    """The numbers of every body that feels sand, at the positions and velocities of the last mj_forward or mj_step.
+
+    Args:
+        model: Compiled, with sand.
+        data: Its data.
+        grain_diameter: Diameter of the sand's grains [m], if it is known.
+    """
     velocity, omega = body_velocities(model, data)
     found = []
     for bed in instances(model):

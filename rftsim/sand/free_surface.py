@@ -2,27 +2,27 @@
 
 import dataclasses
 import math
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 
 @dataclasses.dataclass(frozen=True)
 class FreeSurface:
-    """The plane that bounds the sand from above.
+    """The plane that bounds the sand from above: the terrain of a scene.
 
     Depth and the laws' "up" follow the normal. RFT was measured and fitted on level ground: on slopes it is
     uncalibrated.
-
-    Attributes:
-        height: Where the surface meets the world's z axis [m].
-        normal: Its upward normal; made a unit vector.
 
     Raises:
         ValueError: The normal does not point upward.
     """
 
     height: float = 0.0
+    """Height at which the surface meets the world's z axis [m]."""
     normal: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    """Upward normal of the surface; made a unit vector."""
 
     def __post_init__(self) -> None:
         normal = np.asarray(self.normal, dtype=float)
@@ -35,5 +35,16 @@ class FreeSurface:
 
     @property
     def offset(self) -> float:
-        """The product normal . x of the points x on the surface [m]."""
+        """The product of the normal and any point on the surface, normal . x [m]."""
         return self.height * self.normal[2]
+
+    def depth(self, points: ArrayLike) -> Any:
+        """Depth of points below the surface along its normal [m], positive in the sand.
+
+        Args:
+            points: World frame [m], shape (3,) or (n, 3).
+
+        Returns:
+            A number, or an array of shape (n,).
+        """
+        return self.offset - np.dot(points, self.normal)

@@ -12,6 +12,17 @@ ALPHA_Z_PLATE: Final = 0.87574
 """Generic stress of 3D-RFT (Table C.3) on a flat plate pushed straight down; joins zeta and xi_n."""
 
 
+def number(default: float | None, *, above: float | None = None, at_least: float | None = None) -> Any:
+    """A field of `Sand` for a parameter that is a number, with its default and its lower bound.
+
+    Args:
+        default: Its default; None where it may be unknown.
+        above: What it must exceed.
+        at_least: What it must not fall below.
+    """
+    return dataclasses.field(default=default, metadata={"above": above, "at_least": at_least})
+
+
 @dataclasses.dataclass(frozen=True)
 class Sand:
     """A dry granular medium, in SI units.
@@ -20,31 +31,29 @@ class Sand:
     through a flat plate pushed straight down, zeta = 0.87574 xi_n; where neither is given, xi_n is interpolated in
     [Agarwal] Table C.1 from `rho_c`, `mu_int` and `g`.
 
-    Attributes:
-        rho_c: Bulk density at the critical state [kg/m^3]; None where unknown.
-        mu_int: Internal friction [-]; None where unknown.
-        mu_surf: Friction between the sand and the bodies [-]; above mu_int it is doubtful, and warned about.
-        xi_n: Strength in the 3D laws [N/m^3].
-        zeta: Strength in the 2D laws [N/m^3]; 1e6 times its value in N/cm^3.
-        lambda_: Factor of the inertial term of the dynamic laws [-]: 1.0 wheel, 1.1 horizontal plate drag, 1.4 sphere
-            impact, 2.8 plane-strain vertical plate, about 4 runner. For 3D-DRFT no calibration has been published.
-        g: Gravity that the sand's strength belongs to [m/s^2].
-        grain_diameter: Grain diameter [m], for the inertial number of the validity report; None where unknown.
-        source: Where the numbers come from.
-
     Raises:
         SandError: A parameter is out of range, or too few are given.
     """
 
-    rho_c: float | None = None
-    mu_int: float | None = None
-    mu_surf: float = 0.4
-    xi_n: float | None = None
-    zeta: float | None = None
-    lambda_: float = 1.0
-    g: float = GRAVITY
-    grain_diameter: float | None = None
+    rho_c: float | None = number(None, above=0.0)
+    """Bulk density at the critical state [kg/m^3]; None where unknown."""
+    mu_int: float | None = number(None, above=0.0)
+    """Internal friction [-]; None where unknown."""
+    mu_surf: float = number(0.4, at_least=0.0)
+    """Friction between the sand and the bodies [-]; above mu_int it is doubtful, and warned about."""
+    xi_n: float | None = number(None, above=0.0)
+    """Strength in the 3D laws [N/m^3]."""
+    zeta: float | None = number(None, above=0.0)
+    """Strength in the 2D laws [N/m^3]; 1e6 times its value in N/cm^3."""
+    lambda_: float = number(1.0, at_least=0.0)
+    """Factor of the inertial term of the dynamic laws [-]: 1.0 wheel, 1.1 horizontal plate drag, 1.4 sphere impact, 2.8
+    plane-strain vertical plate, about 4 runner. For 3D-DRFT no calibration has been published."""
+    g: float = number(GRAVITY, above=0.0)
+    """Gravity that the sand's strength belongs to [m/s^2]."""
+    grain_diameter: float | None = number(None, above=0.0)
+    """Grain diameter [m], for the inertial number of the validity report; None where unknown."""
     source: str = ""
+    """Reference that the numbers come from."""
 
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
@@ -52,11 +61,9 @@ class Sand:
             if value is None and field.default is not None:
                 raise SandError(f"{field.name} must be a number, not None")
             if field.name != "source" and value is not None:
-                object.__setattr__(self, field.name, _finite(field.name, value))
-        for name, low in _ABOVE_ZERO.items():
-            value = getattr(self, name)
-            if value is not None and not (value > 0.0 if low else value >= 0.0):
-                raise SandError(f"{name} must be {'positive' if low else 'zero or more'}, not {value:g}")
+                object.__setattr__(self, field.name, finite(field.name, value))
+        for field in dataclasses.fields(self):
+            check_bounds(field, getattr(self, field.name))
         if self.mu_int is not None and self.mu_surf > self.mu_int:
             warnings.warn(
                 f"mu_surf = {self.mu_surf:g} exceeds mu_int = {self.mu_int:g}: sand slips inside itself first, "
@@ -78,7 +85,7 @@ class Sand:
         return xi_n_from_table(self.rho_c, self.mu_int, self.g)
 
     def density(self) -> float:
-        """rho_c, which the dynamic laws need.
+        """The density rho_c [kg/m^3], which the dynamic laws need.
 
         Raises:
             SandError: The density is unknown.
@@ -95,16 +102,15 @@ class Sand:
         from Table C.1 and keeps zeta / xi_n.
         """
         for key, value in changes.items():
-            if key not in _DEFAULTS:
-                raise SandError(f"sand has no parameter {key!r}; it has {', '.join(sorted(_DEFAULTS))}")
+            check_known(key)
             if key in ("rho_c", "mu_int", "g") and value is not None:
-                changes[key] = _finite(key, value)
+                changes[key] = finite(key, value)
         if any(key in changes and changes[key] is None for key in ("rho_c", "mu_int")):
             return dataclasses.replace(self, **changes)  # nothing can follow from what is unknown
         if not {"xi_n", "zeta"} & set(changes):
             assert self.xi_n is not None
             assert self.zeta is not None
-            factor = _finite("g", changes.get("g", self.g)) / self.g
+            factor = finite("g", changes.get("g", self.g)) / self.g
             if self.rho_c is not None:
                 factor *= changes.get("rho_c", self.rho_c) / self.rho_c
             if changes.get("mu_int", self.mu_int) != self.mu_int and self.mu_int is not None:
@@ -130,26 +136,47 @@ class Sand:
         return cls(xi_n=force / (ALPHA_Z_PLATE * area * depth), **parameters)
 
 
-_ABOVE_ZERO: Final = {
-    "rho_c": True,
-    "mu_int": True,
-    "mu_surf": False,
-    "xi_n": True,
-    "zeta": True,
-    "lambda_": False,
-    "g": True,
-    "grain_diameter": True,
-}
+DEFAULTS: Final = {field.name: field.default for field in dataclasses.fields(Sand)}
+"""The default of each parameter by its name, `source` included."""
+PARAMETERS: Final = tuple(name for name in DEFAULTS if name != "source")
+"""Names of the parameters that are numbers."""
 
 
-_DEFAULTS: Final = {field.name: field.default for field in dataclasses.fields(Sand)}
+def check_known(name: str) -> None:
+    """Refuse a name that is no parameter of a sand.
+
+    Raises:
+        SandError: There is no such parameter; the message lists those there are.
+    """
+    if name not in DEFAULTS:
+        raise SandError(f"sand has no parameter {name!r}; it has {', '.join(sorted(DEFAULTS))}")
 
 
-def _finite(name: str, value: object) -> float:
+def finite(name: str, value: object) -> float:
+    """The value of a parameter as a finite number, from a number or its text.
+
+    Raises:
+        SandError: It is no number, or not finite.
+    """
     try:
-        number = float(value)  # type: ignore[arg-type]
+        found = float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError):
         raise SandError(f"{name} must be a number, not {value!r}") from None
-    if not math.isfinite(number):
-        raise SandError(f"{name} must be finite, not {number}")
-    return number
+    if not math.isfinite(found):
+        raise SandError(f"{name} must be finite, not {found}")
+    return found
+
+
+def check_bounds(field: "dataclasses.Field[Any]", value: float | None) -> None:
+    """Refuse a value that the bounds of its field exclude; None is unknown, and within any.
+
+    Raises:
+        SandError: The value is too small.
+    """
+    above, at_least = field.metadata.get("above"), field.metadata.get("at_least")
+    if value is None:
+        return
+    if above is not None and not value > above:
+        raise SandError(f"{field.name} must be {f'above {above:g}' if above else 'positive'}, not {value:g}")
+    if at_least is not None and not value >= at_least:
+        raise SandError(f"{field.name} must be {f'{at_least:g}' if at_least else 'zero'} or more, not {value:g}")

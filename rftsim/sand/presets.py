@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from rftsim.errors import SandError
-from rftsim.sand.medium import _DEFAULTS, Sand, _finite
+from rftsim.sand.medium import PARAMETERS, Sand, check_known, finite
 from rftsim.sand.strength import GRAVITY, xi_n_cubic
 
 PRESETS: Final[Mapping[str, Sand]] = {
@@ -54,7 +54,7 @@ PRESETS: Final[Mapping[str, Sand]] = {
 
 
 def make_sand(sand: "Sand | str | Mapping[str, Any]") -> Sand:
-    """Sand from whatever names it.
+    """The sand that a preset's name, parameters, a file or a mapping stand for.
 
     Args:
         sand: A `Sand`, a preset's name, `key=value,...` (`preset=NAME` may start it), a TOML file, or a mapping.
@@ -75,7 +75,7 @@ def make_sand(sand: "Sand | str | Mapping[str, Any]") -> Sand:
 
 
 def read_parameters(text: str) -> dict[str, Any]:
-    """Parameters of a sand, as they stand in `key=value,...` or in a TOML file.
+    """Parameters of a sand by name, as they stand in `key=value,...` or in a TOML file.
 
     Raises:
         SandError: It is neither, or the file cannot be read.
@@ -113,14 +113,13 @@ def _from_mapping(parameters: dict[str, Any]) -> Sand:
     if base is not None and (not isinstance(base, str) or base not in PRESETS):
         raise SandError(f"no sand {base!r}; presets are {', '.join(PRESETS)}")
     for key in parameters:
-        if key not in _DEFAULTS:
-            raise SandError(f"sand has no parameter {key!r}; it has {', '.join(sorted(_DEFAULTS))}")
+        check_known(key)
     if parameters.get("xi_n") == "cubic":
         preset = dataclasses.asdict(PRESETS[base]) if base else {"g": GRAVITY}
         known = {key: parameters.get(key, preset.get(key)) for key in ("rho_c", "mu_int", "g")}
         for key, value in known.items():
             if value is None:
                 raise SandError(f"xi_n=cubic needs {key}")
-        parameters["xi_n"] = xi_n_cubic(*(_finite(key, value) for key, value in known.items()))
-    given: dict[str, Any] = {k: v if k == "source" else _finite(k, v) for k, v in parameters.items()}
+        parameters["xi_n"] = xi_n_cubic(*(finite(key, value) for key, value in known.items()))
+    given: dict[str, Any] = {k: finite(k, v) if k in PARAMETERS else v for k, v in parameters.items()}
     return PRESETS[base].replace(**given) if base else Sand(**given)

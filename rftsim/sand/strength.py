@@ -29,7 +29,7 @@ XI_N_CUBIC: Final = (89.0, -386.0, 894.0)
 
 
 def xi_n_from_table(rho_c: float, mu_int: float, g: float = GRAVITY) -> float:
-    """xi_n [N/m^3] by interpolation in [Agarwal] Table C.1.
+    """The strength xi_n [N/m^3] by interpolation in [Agarwal] Table C.1, from SI units.
 
     Raises:
         SandError: mu_int is outside the table.
@@ -41,6 +41,6 @@ def xi_n_from_table(rho_c: float, mu_int: float, g: float = GRAVITY) -> float:
 
 
 def xi_n_cubic(rho_c: float, mu_int: float, g: float = GRAVITY) -> float:
-    """xi_n [N/m^3] by the cubic of [Agarwal] Fig. C-2, which misses Table C.1 by up to 34 %."""
+    """The strength xi_n [N/m^3] by the cubic of [Agarwal] Fig. C-2, which misses Table C.1 by up to 34 %."""
     a, b, c = XI_N_CUBIC
     return rho_c * g * mu_int * (a + mu_int * (b + mu_int * c))

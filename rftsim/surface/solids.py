@@ -32,13 +32,13 @@ _CUBE: Final = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for
 
 
 def box(extents: Array) -> Array:
-    """A box."""
+    """A box of the given lengths along x, y and z [m], shape (12, 3, 3)."""
     triangles: Array = _CUBE * extents
     return triangles
 
 
 def ball(subdivisions: int) -> Array:
-    """An icosahedron, each of whose triangles is cut in four so many times, with its corners on the unit sphere."""
+    """An icosahedron, each of whose triangles is cut in four so many times, its corners on the unit sphere."""
     triangles = _ICOSAHEDRON
     for _ in range(subdivisions):
         triangles = quartered(triangles)
@@ -48,13 +48,20 @@ def ball(subdivisions: int) -> Array:
 
 
 def cylinder(radius: float, height: float, sections: int) -> Array:
-    """A prism inscribed to a cylinder about z."""
+    """A prism of so many sides, inscribed to a cylinder about z."""
     half = height / 2.0
     return revolved(np.array([(0.0, -half), (radius, -half), (radius, half), (0.0, half)]), sections)
 
 
 def capsule(radius: float, height: float, sections: int, rings: int) -> Array:
-    """Inscribed to a capsule about z, `height` between the centres of its ends, of `rings` rings each half circle."""
+    """A solid inscribed to a capsule about z.
+
+    Args:
+        radius: Radius of the capsule [m].
+        height: Distance between the centres of its ends [m].
+        sections: Number of sides about z.
+        rings: Number of rings of each half circle.
+    """
     quarter = rings // 2 + 1
     angle = np.concatenate([np.linspace(-np.pi / 2.0, 0.0, quarter), np.linspace(0.0, np.pi / 2.0, quarter)])
     profile = radius * np.column_stack([np.cos(angle), np.sin(angle)])
@@ -64,7 +71,12 @@ def capsule(radius: float, height: float, sections: int, rings: int) -> Array:
 
 
 def revolved(profile: Array, sections: int) -> Array:
-    """What a profile, distance from the axis and height from bottom to top, (n, 2), sweeps about z; no empty faces."""
+    """The solid that a profile sweeps about z, without empty faces.
+
+    Args:
+        profile: Distances from the axis and heights, from bottom to top [m], shape (n, 2).
+        sections: Number of sides about z.
+    """
     radius, height = profile.T
     angle = np.linspace(0.0, 2.0 * np.pi, sections + 1)
     angle[-1] = 0.0
@@ -81,6 +93,6 @@ def revolved(profile: Array, sections: int) -> Array:
 
 
 def volume(triangles: Array) -> float:
-    """Of a closed surface: the flux of (x, 0, 0) through it."""
+    """Volume within a closed surface [m^3]: the flux of (x, 0, 0) through it."""
     a, b, c = np.moveaxis(triangles, 1, 0)
     return float((np.cross(b - a, c - b)[:, 0] * triangles.sum(axis=1)[:, 0]).sum() / 6.0)

@@ -7,7 +7,7 @@ Array = NDArray[np.float64]
 
 
 def split(triangles: Array, max_edge: float) -> Array:
-    """Triangles whose edges, where longer than max_edge, are halved, and the halves again; the others stay.
+    """The triangles after edges longer than max_edge [m] were halved, and the halves again; the others stay.
 
     The same as trimesh's `subdivide_to_size`, triangle by triangle.
     """

@@ -14,27 +14,26 @@ Array = NDArray[np.float64]
 Faces = NDArray[np.integer[Any]]
 
 EDGE_ON_DOUBLE: Final = 1e-9
+"""Leading-edge tolerance on n.v_hat [-]: rounding of normals computed in double precision."""
 EDGE_ON_SINGLE: Final = 1e-6
-"""Leading-edge tolerance on n.v_hat: rounding of normals computed in double, or from MuJoCo's single precision."""
+"""Leading-edge tolerance on n.v_hat [-]: rounding of normals from MuJoCo's single precision."""
 
 LARGEST: Final = 20.0
+"""Size of a body above which its mesh is suspected to be in other units [m]."""
 SMALLEST: Final = 1e-3
-"""Body sizes [m] outside of which a mesh is suspected to be in other units."""
+"""Size of a body below which its mesh is suspected to be in other units [m]."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Wheel:
-    """What the structural term needs to know of a driven wheel; in the body frame.
-
-    Attributes:
-        axis: Axis of rotation, a unit vector; positive spin about it rolls the wheel along axis x up.
-        centre: A point on the axis [m].
-        radius: Outer radius r of delta h = r (r omega^2 / g) [m].
-    """
+    """The measures of a driven wheel that the structural term needs, in the body frame."""
 
     axis: tuple[float, float, float]
+    """Axis of rotation, made a unit vector; positive spin about it rolls the wheel along axis x up."""
     centre: tuple[float, float, float]
+    """A point on the axis [m]."""
     radius: float
+    """Outer radius r of delta h = r (r omega^2 / g) [m]."""
 
     def __post_init__(self) -> None:
         length = float(np.linalg.norm(self.axis))
@@ -45,21 +44,18 @@ class Wheel:
 
 @dataclasses.dataclass(frozen=True)
 class Surface:
-    """Triangles that the sand can press on, in the body frame.
-
-    Attributes:
-        triangles: Corners [m], shape (ntri, 3, 3), counter-clockwise seen from outside.
-        edge_on: Leading-edge tolerance: n.v_hat down to minus this counts as leading.
-        wheel: Set where the body is a wheel to the structural term.
-        notes: What was found and repaired, one sentence each.
-        outline: Where the triangles stand for others, corners of those [m], shape (npoint, 3).
-    """
+    """The triangles of a body that the sand can press on, in the body frame."""
 
     triangles: Array
+    """Corners [m], shape (ntri, 3, 3), counter-clockwise seen from outside."""
     edge_on: float = EDGE_ON_DOUBLE
+    """Leading-edge tolerance: n.v_hat down to minus this counts as leading [-]."""
     wheel: Wheel | None = None
+    """Measures of the wheel where the body is one to the structural term."""
     notes: tuple[str, ...] = ()
+    """Sentences that say what was found and repaired."""
     outline: Array | None = None
+    """Where the triangles stand for others, corners of those [m], shape (npoint, 3)."""
     centres: Array = dataclasses.field(init=False)
     """Centroids [m], shape (ntri, 3)."""
     normals: Array = dataclasses.field(init=False)
@@ -77,21 +73,21 @@ class Surface:
 
     @property
     def ntri(self) -> int:
-        """Number of triangles."""
+        """The number of triangles of the surface."""
         return len(self.areas)
 
     @property
     def corners(self) -> Array:
-        """Points that span the body [m], shape (npoint, 3)."""
+        """The points that span the body [m], shape (npoint, 3)."""
         return self.triangles.reshape(-1, 3) if self.outline is None else self.outline
 
     @property
     def size(self) -> float:
-        """Largest extent along an axis [m]."""
+        """The largest extent of the body along an axis [m]."""
         return float(np.ptp(self.corners, axis=0).max())
 
     def moved(self, rotation: ArrayLike, translation: ArrayLike) -> "Surface":
-        """The surface after x -> rotation x + translation."""
+        """The surface after the motion x -> rotation x + translation [m]."""
         r, t = np.asarray(rotation), np.asarray(translation)
         wheel = self.wheel
         if wheel is not None:
@@ -121,7 +117,7 @@ class Surface:
 
 
 def joined(surfaces: "list[Surface]") -> Surface:
-    """Several surfaces of one body as one."""
+    """The surfaces of the parts of a body as one surface, not of a wheel."""
     return Surface(
         triangles=np.concatenate([s.triangles for s in surfaces]),
         edge_on=max(s.edge_on for s in surfaces),
@@ -137,23 +133,23 @@ def make_surface(
     allow_open: bool = False,
     edge_on: float = EDGE_ON_DOUBLE,
 ) -> Surface:
-    """A checked surface from vertices [m], (nvert, 3), and faces, (nface, 3).
+    """A checked surface from vertices and faces.
 
     Faces of no area and repeated faces are dropped, inconsistent or inward winding is turned; each is noted.
+
+    Args:
+        vertices: Places of the vertices [m], shape (nvert, 3).
+        faces: Numbers of each face's vertices, shape (nface, 3).
+        name: Name of the mesh in messages.
+        allow_open: Whether a surface that is not closed is accepted.
+        edge_on: Leading-edge tolerance of its triangles on n.v_hat [-].
 
     Raises:
         SurfaceError: No faces, a vertex that is not finite, or a surface that is not closed (unless allow_open).
     """
     points = np.asarray(vertices, dtype=float).reshape(-1, 3)
     corners = np.asarray(faces, dtype=int).reshape(-1, 3)
-    if not len(corners):
-        raise SurfaceError(f"{name} has no faces; the sand needs a closed triangle mesh")
-    if corners.min() < 0 or corners.max() >= len(points):
-        wrong = corners.min() if corners.min() < 0 else corners.max()
-        raise SurfaceError(f"{name}: a face refers to vertex {wrong}; vertices are 0 to {len(points) - 1}")
-    bad = ~np.isfinite(points[corners]).all(axis=(1, 2))
-    if bad.any():
-        raise SurfaceError(f"{name}: face {int(np.argmax(bad))} has a vertex that is not finite")
+    _check_faces(points, corners, name)
     notes: list[str] = []
     points, corners = _merged(points, corners)
     extent = float(np.linalg.norm(np.ptp(points, axis=0)))
@@ -172,17 +168,37 @@ def make_surface(
         if not allow_open:
             raise SurfaceError(f"{text}: close it, or allow open meshes (then only its outer side is felt)")
         notes.append(text)
-    size = float(np.ptp(points, axis=0).max())
-    if not SMALLEST <= size <= LARGEST:
-        notes.append(
-            f"{name} is {size:g} m in size; lengths are in metres"
-            + (f": a mesh in millimetres needs scale 0.001 ({size / 1000:g} m)" if size > LARGEST else "")
-        )
+    notes += _size_doubts(float(np.ptp(points, axis=0).max()), name)
     return Surface(points[corners], edge_on=edge_on, notes=tuple(notes))
+
+
+def _check_faces(points: Array, faces: Faces, name: str) -> None:
+    """Refuse a mesh without faces, or whose faces have vertices that do not exist or are not finite."""
+    if not len(faces):
+        raise SurfaceError(f"{name} has no faces; the sand needs a closed triangle mesh")
+    if faces.min() < 0 or faces.max() >= len(points):
+        wrong = faces.min() if faces.min() < 0 else faces.max()
+        raise SurfaceError(f"{name}: a face refers to vertex {wrong}; vertices are 0 to {len(points) - 1}")
+    bad = ~np.isfinite(points[faces]).all(axis=(1, 2))
+    if bad.any():
+        raise SurfaceError(f"{name}: face {int(np.argmax(bad))} has a vertex that is not finite")
+
+
+def _size_doubts(size: float, name: str) -> list[str]:
+    """The doubt about a size that suggests other units, if it does."""
+    if SMALLEST <= size <= LARGEST:
+        return []
+    remedy = f": a mesh in millimetres needs scale 0.001 ({size / 1000:g} m)" if size > LARGEST else ""
+    return [f"{name} is {size:g} m in size; lengths are in metres{remedy}"]
 
 
 def load_surface(path: "str | Path", *, scale: float = 1.0, allow_open: bool = False) -> Surface:
     """A checked surface from a mesh file of any kind that trimesh reads.
+
+    Args:
+        path: The file.
+        scale: Metres to the unit of the file's lengths, 0.001 for millimetres.
+        allow_open: Whether a surface that is not closed is accepted.
 
     Raises:
         SurfaceError: The file is missing, is not a mesh, or does not bound a body.

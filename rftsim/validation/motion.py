@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from rftsim.run.rates import measure
+from rftsim.run.rate_sweep import measure
 from rftsim.validation.plates import fit_terms
 from rftsim.validation.shipped import Results, outcome, shipped
 from rftsim.validation.study import Measured, Request, Row, at_least, near

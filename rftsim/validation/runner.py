@@ -4,7 +4,7 @@ import functools
 from collections.abc import Callable
 from typing import Any, Final
 
-from rftsim.run.rates import measure
+from rftsim.run.rate_sweep import measure
 from rftsim.validation.study import Measured, Request, Row, at_least, near
 
 RATES: Final = (20.0, 40.0, 60.0, 80.0, 100.0, 150.0, 200.0, 250.0, 300.0)

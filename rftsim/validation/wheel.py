@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from rftsim_models.wheels import GROUSER_WHEEL
 
-from rftsim.run.rates import measure
+from rftsim.run.rate_sweep import measure
 from rftsim.run.scenes import POPPY
 from rftsim.validation import balance, terramechanics
 from rftsim.validation.study import Measured, Request, Row, at_least, at_most, near

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Final
 
-from rftsim.run.rates import Point
+from rftsim.run.rate_sweep import Point
 from rftsim.view.figure import make_figure, save_figure
 
 STYLES: Final = {"rft2d": ("C0", "--"), "drft2d": ("C0", "-"), "rft3d": ("C1", "--"), "drft3d": ("C1", "-")}

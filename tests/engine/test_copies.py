@@ -25,7 +25,7 @@ NSTEP = 40
 @pytest.fixture(scope="module", params=["explicit", "implicit"])
 def model(request):
     """A free body with a hinged and a fixed one, in the sand."""
-    return sandy(tree(np.random.default_rng(11), ["free", "hinge", "none"]), surface=0.1, force=request.param)
+    return sandy(tree(np.random.default_rng(11), ["free", "hinge", "none"]), terrain=0.1, force=request.param)
 
 
 def starts_of(model):
@@ -129,7 +129,7 @@ def test_batch_with_sand_of_its_own_in_each_simulation():
 def test_batch_with_random_sand(force, nthread):
     """Strength, friction and density of its own in each simulation: bit-identical to single runs with that sand."""
     bodies = tree(np.random.default_rng(11), ["free", "hinge", "none"])
-    model = sandy(bodies, surface=0.1, law="drft3d", force=force)
+    model = sandy(bodies, terrain=0.1, law="drft3d", force=force)
     starts = starts_of(model)
     batch = batch_of(model, starts, nthread)
     sand = model.numeric("rftsim-sand:sand").adr[0] + np.arange(instances(model)[0].sand.size)

@@ -145,10 +145,10 @@ def test_faces_that_a_planar_law_never_feels_are_left_out():
 def test_slopes_across_the_default_plane():
     """A 3D law needs no plane of motion, so the surface may tilt any way; a planar law needs one along the slope."""
     slope = FreeSurface(normal=(0.0, 0.2, 1.0))
-    bed_of(BALL, surface=slope)
-    bed_of(BALL, law="rft2d", surface=slope, plane=(1, 0, 0))
+    bed_of(BALL, terrain=slope)
+    bed_of(BALL, law="rft2d", terrain=slope, plane=(1, 0, 0))
     with pytest.raises(ValueError, match="plane of motion"):
-        bed_of(BALL, law="rft2d", surface=slope)
+        bed_of(BALL, law="rft2d", terrain=slope)
 
 
 def test_planes_may_be_turned():
@@ -169,7 +169,7 @@ def test_surface_may_be_raised_and_tilted():
     """The scene under a tilted surface is the tilted scene under a level one; the sand is drawn there."""
     normal = np.array([0.2, 0.0, 1.0]) / np.hypot(0.2, 1.0)
     turn = about((0, 1, 0), np.arctan(0.2))
-    tilted = sandy(surface=FreeSurface(0.3, tuple(normal)))
+    tilted = sandy(terrain=FreeSurface(0.3, tuple(normal)))
     level = sandy()
     forces = []
     for model, r, origin in ((level, np.eye(3), 0.0), (tilted, turn, 0.3)):

@@ -21,7 +21,7 @@ def test_force_is_the_transposed_jacobian_times_the_wrench(seed):
     """qfrc_passive = sum over bodies of J_p^T f + J_r^T t, against mj_applyFT, on random trees of every joint."""
     rng = np.random.default_rng(seed)
     kinds = ["free", *rng.choice(["ball", "slide", "hinge", "two", "none"], size=5)]
-    model = sandy(tree(rng, kinds), surface=0.2)
+    model = sandy(tree(rng, kinds), terrain=0.2)
     data = shaken(model, seed)
     expected = applied(model, data)
     assert np.abs(expected).max() > 1e-3
@@ -65,7 +65,7 @@ def test_passive_forces_of_the_model_are_kept():
 def test_one_number_everywhere(law):
     """Sensor = wrench = sum of tractions = `surface_force` of the same surface, pose and twist."""
     spec = spec_of(tree(np.random.default_rng(5), ["free", "hinge", "none"]))
-    bed = add_sand(spec, SAND, law, surface=0.1, force="explicit")
+    bed = add_sand(spec, SAND, law, terrain=0.1, force="explicit")
     model = spec.compile()
     data = shaken(model, 4)
     found = wrenches(model, data)
@@ -81,7 +81,7 @@ def test_one_number_everywhere(law):
         twist = np.zeros(6)
         mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_XBODY, i, twist, 0)
         pose = {"position": data.xpos[i], "rotation": data.xmat[i].reshape(3, 3)}
-        pose |= {"velocity": twist[3:], "angular_velocity": twist[:3], "free_surface": bed.free_surface}
+        pose |= {"velocity": twist[3:], "angular_velocity": twist[:3], "terrain": bed.terrain}
         alone = surface_force(surface, SAND, law, **pose)
         np.testing.assert_allclose(alone.force, found.force[i], atol=1e-12 * scale)
         np.testing.assert_allclose(alone.moment, found.moment[i], atol=1e-12 * scale)

@@ -211,7 +211,7 @@ def test_a_spec_on_which_add_sand_raised_is_unchanged(options):
 def test_a_spec_whose_bed_has_no_name_of_its_own_is_unchanged():
     """... even where floors were to be disabled and the bed's name is taken."""
     spec = spec_of(FLOOR + BALL + BALL.replace("ball", "other"))
-    add_sand(spec, SAND, bodies=["ball"], surface=9.0)
+    add_sand(spec, SAND, bodies=["ball"], terrain=9.0)
     before = spec.to_xml()
     with pytest.raises(SceneError, match="another name"):
         add_sand(spec, SAND, disable_floor=True)

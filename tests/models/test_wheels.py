@@ -9,7 +9,7 @@ from rftsim_models.outline import extruded, lugged_outline
 from rftsim_models.wheels import FOUR_FLAP_RUNNER, GROUSER_WHEEL, HALF_GROUSER_WHEEL, build_wheel
 
 from rftsim import Wheel, add_sand
-from rftsim.run.rates import measure
+from rftsim.run.rate_sweep import measure
 from rftsim.run.run import run
 from rftsim.run.scenes import SCENES, Measured, Staged, stage
 

@@ -111,7 +111,7 @@ def random_case(seed, law):
         arguments |= {"zeta": sand.zeta, "plane": plane}
     else:
         arguments |= {"xi_n": sand.xi_n, "mu_surf": sand.mu_surf}
-    return (surface, sand, {**pose, "free_surface": free, "plane": plane}), (body, arguments)
+    return (surface, sand, {**pose, "terrain": free, "plane": plane}), (body, arguments)
 
 
 @pytest.mark.parametrize("seed", range(12))

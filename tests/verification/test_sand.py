@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rftsim import PRESETS, FreeSurface, RftsimWarning, Sand, SandError, make_sand
-from rftsim.sand.medium import ALPHA_Z_PLATE
+from rftsim.sand.medium import ALPHA_Z_PLATE, PARAMETERS, check_bounds, number
 from rftsim.sand.strength import TABLE_C1, xi_n_cubic, xi_n_from_table
 
 RHO_C = 3000.0
@@ -85,6 +85,25 @@ def test_sand_that_cannot_be(parameters, words):
     with pytest.raises(SandError, match=re.escape(words)):
         Sand(**{"mu_surf": 0.0} | parameters)
     assert issubclass(SandError, ValueError)
+
+
+def test_a_parameter_is_stated_once():
+    """Each parameter but the source is a number with a bound, which the field itself carries."""
+    assert (*PARAMETERS, "source") == tuple(field.name for field in dataclasses.fields(Sand))
+    for name in PARAMETERS:
+        with pytest.raises(SandError, match=f"{name} must be (positive|zero or more), not -1"):
+            Sand(**{"xi_n": 1.0, "mu_surf": 0.0} | {name: -1})
+
+
+@pytest.mark.parametrize(
+    ("bound", "words"),
+    [({"above": 2.0}, "x must be above 2, not 2"), ({"at_least": 2.5}, "x must be 2.5 or more, not 2")],
+)
+def test_bounds_other_than_zero(bound, words):
+    """A parameter may have any lower bound, and its message says which."""
+    thing = dataclasses.make_dataclass("Thing", [("x", float, number(3.0, **bound))])
+    with pytest.raises(SandError, match=words):
+        check_bounds(dataclasses.fields(thing)[0], 2.0)
 
 
 def test_dynamic_laws_need_a_density():
@@ -239,6 +258,14 @@ def test_free_surface():
     surface = FreeSurface(0.5, (3.0, 0.0, 4.0))
     assert surface.normal == pytest.approx((0.6, 0.0, 0.8))
     assert surface.offset == pytest.approx(np.dot(surface.normal, (0, 0, 0.5)))
+
+
+def test_depth_below_the_free_surface():
+    """Depth is the distance along the normal, positive below; of one point a number, of several an array."""
+    surface = FreeSurface(0.5, (3.0, 0.0, 4.0))
+    points = np.array([[0.0, 0.0, 0.5], [0.0, 7.0, -0.5], [1.0, 0.0, 0.5]])
+    np.testing.assert_allclose(surface.depth(points), [0.0, 0.8, -0.6], atol=1e-15)
+    assert surface.depth(points[1]) == pytest.approx(0.8)
 
 
 @pytest.mark.parametrize("normal", [(0, 0, -1), (1, 0, 0), (0, 0, 0), (0, np.nan, 1), (0, 1)])

@@ -59,7 +59,7 @@ def test_tilted_free_surface_is_the_rotated_problem(n, v, up, sand, law):
         law,
         velocity=r @ v,
         plane=r @ [0, 1, 0],
-        free_surface=FreeSurface(normal=tuple(up)),
+        terrain=FreeSurface(normal=tuple(up)),
     )
     assume(law != "rft2d" or abs(n[0] * v[0] + n[2] * v[2]) > 1e-6)
     np.testing.assert_allclose(tilted.force, r @ alpha(n, v, law, sand), **EXACT)

@@ -1,4 +1,4 @@
-"""The demonstration: the wheel and the runner of [Agarwal] chapter 4 over their rates, under four laws."""
+"""The wheel and the runner of [Agarwal] chapter 4 over their imposed rates, under four laws: `rftsim demo`."""
 
 import concurrent.futures
 import math
@@ -12,6 +12,7 @@ from rftsim.run.run import STEADY, run
 from rftsim.run.scenes import stage
 
 LAWS: Final = ("rft2d", "drft2d", "rft3d", "drft3d")
+"""Names of the laws that are compared."""
 RATES: Final = {
     "grouser-wheel": (10, 30, 45, 60, 75, 90),
     "four-flap-runner": (20, 60, 100, 150, 200, 300),
@@ -25,25 +26,30 @@ class Point(NamedTuple):
     """One run of the demonstration, in the thesis's dimensionless numbers."""
 
     scene: str
+    """Name of the scene."""
     law: str
+    """Name of the law."""
     rpm: float
+    """Imposed rate [revolutions per minute]."""
     spin: float
-    """omega / sqrt(g / l), l the outer diameter."""
+    """Rate omega / sqrt(g / l), l the outer diameter [-]."""
     speed: float
-    """v / sqrt(g l)."""
+    """Speed v / sqrt(g l) [-]."""
     sinkage: float
-    """Sinkage over l."""
+    """Sinkage over l [-]."""
     slip: float
+    """Slip 1 - v / (R omega) [-]; NaN where there is none."""
     realtime_factor: float
+    """Simulated over elapsed time, of the steps alone."""
 
 
 def points() -> list[tuple[str, str, float]]:
-    """Every (scene, law, rpm) of the demonstration, longest runs first."""
+    """Every scene, law and rate [revolutions per minute] of the demonstration, longest runs first."""
     return [(scene, law, rpm) for scene, rates in RATES.items() for rpm in rates for law in LAWS]
 
 
 def measure(scene: str, law: str, rpm: float, sand: str | None = None) -> Point:
-    """Run one point, on other sand than the scene's if so asked."""
+    """Run one point of the demonstration, on other sand than the scene's if so asked."""
     turn = 60 / rpm
     averaged = max(math.ceil(SHORTEST * STEADY / turn), 1) * turn  # whole turns, so that no lug counts twice
     staged = stage(scene, sand=sand, law=law, settings={"rpm": str(rpm)}, duration=averaged / STEADY)
@@ -65,7 +71,7 @@ def measure(scene: str, law: str, rpm: float, sand: str | None = None) -> Point:
 
 
 def measure_all(processes: int, report: Callable[[Point], None]) -> list[Point]:
-    """Run every point, `processes` at a time; `report` is called as each ends."""
+    """Run every point of the demonstration, `processes` at a time; `report` is called with each as it ends."""
     context = multiprocessing.get_context("spawn")
     jobs = points()
     with concurrent.futures.ProcessPoolExecutor(processes, mp_context=context) as pool:

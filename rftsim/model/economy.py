@@ -1,0 +1,40 @@
+"""Surfaces reduced to the fewest elements that a model needs, as far as its joints let its bodies go."""
+
+import functools
+
+import mujoco
+
+from rftsim.law import layout
+from rftsim.model.felt import Felt
+from rftsim.model.reach import sampled_reach
+from rftsim.reduction import reduce
+from rftsim.reduction.reduce import Economy
+from rftsim.surface.triangles import Array
+
+
+def economise(model: mujoco.MjModel, felt: Felt, sand: Array, tolerance: float) -> dict[str, Economy]:
+    """Replace surfaces by the fewest elements that keep a tolerance, and say so in the reasons.
+
+    Args:
+        model: Compiled.
+        felt: The bodies that feel the sand; changed in place.
+        sand: Packed sand.
+        tolerance: Largest error of a body's wrench, over the largest wrench.
+
+    Returns:
+        The numbers of each surface before and after, by body name.
+    """
+    economies = {}
+    for name, surface in felt.surfaces.items():
+        reach = functools.partial(sampled_reach, model, model.body(name).id, surface)
+        felt.surfaces[name], economies[name] = reduce.reduced(surface, sand, tolerance, reach)
+        felt.reasons[name] += f"; {_said(economies[name], tolerance)}"
+    return economies
+
+
+def _said(found: Economy, tolerance: float) -> str:
+    if found.elements < found.triangles:
+        return f"{found.elements} elements keep its wrench within {100 * found.error:.2g} %"
+    if found.triangles <= layout.BLOCK:
+        return f"one block of {layout.BLOCK} already, the least that the implicit force's derivative takes"
+    return f"no fewer elements found that keep its wrench within {100 * tolerance:g} %"

@@ -1,0 +1,120 @@
+"""Which bodies of a model feel the sand, with what surface, and why."""
+
+import dataclasses
+import difflib
+from typing import Final, NamedTuple
+
+import mujoco
+import numpy as np
+
+from rftsim.errors import SceneError
+from rftsim.law import layout
+from rftsim.model.geometry import body_surface
+from rftsim.model.reach import clearance, stays_in_plane
+from rftsim.sand.free_surface import FreeSurface
+from rftsim.surface.triangles import Array, Surface
+
+CLEAR: Final = 0.1
+"""Height over the sand, over the body's size, from which on a body counts as out of reach."""
+
+
+class Choice(NamedTuple):
+    """The bodies of a model that are to feel the sand, and what of their surfaces."""
+
+    bodies: frozenset[str] | None
+    """Names of bodies; None for all that can."""
+    collision_only: bool
+    """Whether geoms that collide with nothing bound no body."""
+    max_edge: float | None
+    """Longest edge of a triangle [m]; None for a sixth of each geom's size."""
+    allow_open: bool
+    """Whether meshes that are not closed are accepted."""
+    plane: Array | None
+    """Normal of the plane of motion under a planar law, shape (3,)."""
+    terrain: FreeSurface | None
+    """Surface of the sand where bodies that cannot reach it are to be left out."""
+
+
+class Felt(NamedTuple):
+    """The bodies of a model that feel the sand, and the reasons for all."""
+
+    surfaces: dict[str, Surface]
+    """Surface of each body that feels the sand, by body name."""
+    reasons: dict[str, str]
+    """Why each body of the model does or does not feel it, by body name."""
+
+
+def felt_bodies(model: mujoco.MjModel, choice: Choice) -> Felt:
+    """The chosen bodies with their surfaces, in blocks of triangles that lie close together.
+
+    Raises:
+        SceneError: A chosen body does not exist or cannot feel the sand, or no body would.
+        SurfaceError: A mesh does not bound a body.
+    """
+    names = [model.body(i).name for i in range(model.nbody)]
+    _check_chosen(choice.bodies or frozenset(), names)
+    felt = Felt({}, {})
+    for body, name in enumerate(names[1:], 1):
+        if choice.bodies is not None and name not in choice.bodies:
+            felt.reasons[name] = "not among the bodies asked for"
+            continue
+        surface, felt.reasons[name] = _felt_surface(model, body, choice)
+        if surface is not None:
+            felt.surfaces[name] = surface.clustered(layout.BLOCK)
+        elif choice.bodies is not None:
+            raise SceneError(f"body {name!r} cannot feel the sand: it {felt.reasons[name]}")
+    if not felt.surfaces:
+        found_none = "; ".join(f"{name}: {why}" for name, why in felt.reasons.items()) or "the model has no bodies"
+        raise SceneError(
+            f"no body would feel the sand ({found_none}). Bodies need geoms that collide, or geoms='all'; "
+            '<compiler discardvisual="true"/> deletes the others'
+        )
+    return felt
+
+
+def _check_chosen(chosen: frozenset[str], names: list[str]) -> None:
+    for unknown in sorted(chosen - set(names)):
+        near = difflib.get_close_matches(unknown, names, 3, 0.0)
+        raise SceneError(f"no body {unknown!r}; near are {', '.join(near)}")
+    if names[0] in chosen:
+        raise SceneError(f"{names[0]!r} is the world, which cannot move: name bodies that can")
+
+
+def _felt_surface(model: mujoco.MjModel, body: int, choice: Choice) -> tuple[Surface | None, str]:
+    """The part of a body's surface that feels the sand, None where nothing does, and why."""
+    if model.body_weldid[body] == 0:
+        return None, "cannot move"
+    if model.body_plugin[body] >= 0:
+        return None, "has another plugin, or sand already"
+    surface = body_surface(
+        model,
+        body,
+        collision_only=choice.collision_only,
+        max_edge=choice.max_edge,
+        allow_open=choice.allow_open,
+    )
+    if surface is None:
+        return None, "has no geom that collides" if model.body_geomnum[body] else "has no geom"
+    if choice.terrain is not None:
+        above = clearance(model, body, surface, choice.terrain)
+        if above > CLEAR * surface.size:
+            return None, f"stays {above:.3g} m or more above the sand, by its tree and its joints' ranges"
+    return _carrying(model, body, surface, choice.plane)
+
+
+def _carrying(model: mujoco.MjModel, body: int, surface: Surface, plane: Array | None) -> tuple[Surface, str]:
+    """The part of a surface that can carry a force, and why.
+
+    Under a planar law, faces parallel to the plane of motion carry nothing; where the body cannot turn out of that
+    plane they never will.
+    """
+    everything = f"moves, {surface.ntri} triangles"
+    if plane is None or not stays_in_plane(model, body, plane):
+        return surface, everything
+    carries = np.abs(surface.normals @ plane) < 1.0 - 1e-6
+    if carries.all() or not carries.any():
+        return surface, everything
+    return (
+        dataclasses.replace(surface, triangles=surface.triangles[carries]),
+        f"moves in the plane; {np.count_nonzero(~carries)} of {surface.ntri} triangles are parallel to it and left out",
+    )

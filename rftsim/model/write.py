@@ -1,0 +1,131 @@
+"""The MJCF elements of a bed of sand: the plugin and the numbers that carry it, its sensors, and how it is drawn."""
+
+import math
+from collections.abc import Iterable, Mapping
+from typing import Any, Final, NamedTuple
+
+import mujoco
+
+from rftsim.engine import block as engine
+from rftsim.errors import SceneError
+from rftsim.law import layout
+from rftsim.sand.free_surface import FreeSurface
+from rftsim.surface.triangles import Array, Surface
+
+SAND_RGBA: Final = (1.0, 1.0, 1.0, 0.6)
+"""Colour by which the texture of the drawn sand is multiplied, and its opacity."""
+GRAIN_RGB: Final = ((0.78, 0.72, 0.52), (0.66, 0.59, 0.41))
+"""Colours of the drawn sand and of the grains on it."""
+
+
+class Carrier(NamedTuple):
+    """The plugin instance that carries a bed of sand, and the name of its plugin."""
+
+    name: str
+    plugin: str
+
+
+def check_bed(spec: mujoco.MjSpec, name: str) -> None:
+    """Refuse a bed's name that a plugin instance has already.
+
+    Raises:
+        SceneError: The name is taken.
+    """
+    if name in {instance.name for instance in spec.plugins}:
+        raise SceneError(f"the model has a plugin instance {name!r} already: give this bed another name")
+
+
+def check_sensors(spec: mujoco.MjSpec, bodies: Iterable[str]) -> None:
+    """Refuse bodies for whose wrench a sensor's name is taken.
+
+    Raises:
+        SceneError: The model has such a sensor.
+    """
+    taken = {sensor.name for sensor in spec.sensors} & {_sensor(body) for body in bodies}
+    if taken:
+        raise SceneError(f"the model has a sensor {min(taken)!r} already: rename it, or pass sensors=False")
+
+
+def check_drawing(spec: mujoco.MjSpec, name: str) -> None:
+    """Refuse a bed whose drawing would have the name of something else.
+
+    Raises:
+        SceneError: The model has a geom, texture or material of that name.
+    """
+    for kind, elements in (("geom", spec.geoms), ("texture", spec.textures), ("material", spec.materials)):
+        if _drawing(name) in {element.name for element in elements}:
+            raise SceneError(f"the model has a {kind} {_drawing(name)!r} already: rename it, or pass draw=False")
+
+
+def write_bed(spec: mujoco.MjSpec, carrier: Carrier, sand: Array, surfaces: Mapping[str, Surface]) -> None:
+    """Put a bed of sand and the surfaces of bodies into a spec.
+
+    Args:
+        spec: The model; every body that feels the sand has its name.
+        carrier: The plugin instance that is made.
+        sand: Packed sand.
+        surfaces: Surface of each body that feels the sand, by body name.
+    """
+    spec.activate_plugin(carrier.plugin)
+    spec.add_plugin(name=carrier.name, plugin_name=carrier.plugin, active=True)
+    spec.add_numeric(name=engine.SAND_MARKER + carrier.name, data=sand, size=sand.size)
+    for body, surface in surfaces.items():
+        _attach(spec.body(body).plugin, carrier)
+        data = layout.pack_surface(surface)
+        for first in range(0, data.size, engine.CHUNK):
+            chunk = data[first : first + engine.CHUNK]
+            more = f"{first // engine.CHUNK}-" if first else ""
+            spec.add_numeric(name=more + engine.BODY_MARKER + body, data=chunk, size=chunk.size)
+
+
+def write_sensors(spec: mujoco.MjSpec, carrier: Carrier, bodies: Iterable[str]) -> None:
+    """Add a sensor of the sand's wrench on each body: force, then moment, world frame."""
+    for body in bodies:
+        sensor = spec.add_sensor(
+            name=_sensor(body), type=mujoco.mjtSensor.mjSENS_PLUGIN, objtype=mujoco.mjtObj.mjOBJ_BODY, objname=body
+        )
+        _attach(sensor.plugin, carrier)
+
+
+def write_drawing(spec: mujoco.MjSpec, name: str, terrain: FreeSurface) -> None:
+    """Draw the surface of a bed of sand as a translucent plane of grains, which collides with nothing."""
+    normal, drawing = terrain.normal, _drawing(name)
+    half = 0.5 * math.acos(min(normal[2], 1.0))
+    length = math.hypot(normal[0], normal[1]) or 1.0
+    quat = [math.cos(half), -math.sin(half) * normal[1] / length, math.sin(half) * normal[0] / length, 0.0]
+    spec.add_texture(
+        name=drawing,
+        type=mujoco.mjtTexture.mjTEXTURE_2D,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_FLAT,
+        mark=mujoco.mjtMark.mjMARK_RANDOM,
+        random=0.15,
+        rgb1=GRAIN_RGB[0],
+        markrgb=GRAIN_RGB[1],
+        width=64,
+        height=64,
+    )
+    grains = spec.add_material(name=drawing, texrepeat=[4, 4], texuniform=True)
+    grains.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = drawing
+    spec.worldbody.add_geom(
+        name=drawing,
+        type=mujoco.mjtGeom.mjGEOM_PLANE,
+        size=[0, 0, 0.1],
+        pos=[0, 0, terrain.height],
+        quat=quat,
+        contype=0,
+        conaffinity=0,
+        material=drawing,
+        rgba=SAND_RGBA,
+    )
+
+
+def _sensor(body: str) -> str:
+    return f"{body}_sand"
+
+
+def _drawing(bed: str) -> str:
+    return f"{bed}_surface"
+
+
+def _attach(plugin: Any, carrier: Carrier) -> None:
+    plugin.name, plugin.plugin_name, plugin.active = carrier.name, carrier.plugin, True
