@@ -6,10 +6,9 @@ from typing import Final, NamedTuple
 import mujoco
 import numpy as np
 
-from rftsim.law.layout import SAND_FIELDS, STRENGTHS
 from rftsim.model.add_sand import add_sand
 from rftsim.model.readout import instances
-from rftsim_envs.physics import Array, Physics
+from rftsim_envs.physics import Physics
 from rftsim_envs.task import Config, Task
 
 FRICTION: Final = 0.8
@@ -94,19 +93,17 @@ class Ground:
             self._sliding = physics.setting("geom_friction")[:, model.geom(FLOOR).id]
             self._before = self._sliding[0].copy()
         else:
-            sand = instances(model)[0].sand
-            first = (sand.ctypes.data - model.numeric_data.ctypes.data) // sand.itemsize
-            self._sand: Array = physics.setting("numeric_data")[:, first : first + sand.size]
-            self._before = sand.copy()
+            self._beds = instances(model)[0].beds_in(physics.setting("numeric_data"))
+            self._before = self._beds[0].copy()
 
     def put(self, i: int, drawn: Draw) -> None:
         """Give simulation i the ground of an episode."""
         if self._rigid:
             self._sliding[i, 0] = drawn.friction * self._before[0]
         else:
-            self._sand[i, STRENGTHS] = drawn.strength * self._before[STRENGTHS]
-            k = SAND_FIELDS.index("mu_surf")
-            self._sand[i, k] = drawn.friction * self._before[k]
+            for name in ("xi_n", "zeta"):
+                self._beds[name][i] = drawn.strength * self._before[name]
+            self._beds["mu_surf"][i] = drawn.friction * self._before["mu_surf"]
         x, y = drawn.downhill
         self.gravity[i] = x, y, -math.sqrt(1.0 - x * x - y * y)
         self._gravity[i] = self._pull * self.gravity[i]

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from rftsim.law.layout import SAND_FIELDS
+from rftsim.law.layout import HEADER, record
 from rftsim.model.readout import instances
 from rftsim.run.validity import DEPTH_LIMIT, FROUDE_LIMIT
 from rftsim_envs.physics import Physics
@@ -18,11 +18,12 @@ class Limits:
         self._bodies = [body for bed in beds for body in bed.bodies]
         if not self._bodies:
             return
-        boxes = np.array([surface[1:7] for bed in beds for surface in bed.bodies.values()])
-        self._centre, self._half = 0.5 * (boxes[:, :3] + boxes[:, 3:]), 0.5 * (boxes[:, 3:] - boxes[:, :3])
+        headers = [record(surface, HEADER) for bed in beds for surface in bed.bodies.values()]
+        low, high = np.array([one.lowest for one in headers]), np.array([one.highest for one in headers])
+        self._centre, self._half = 0.5 * (low + high), 0.5 * (high - low)
         self._size = 2.0 * self._half.max(axis=1)
-        self._dynamic = bool(beds[0].sand[SAND_FIELDS.index("dynamic")])
-        self._limit = np.sqrt(beds[0].sand[SAND_FIELDS.index("g")] * self._size)
+        self._dynamic = bool(beds[0].bed.dynamic)
+        self._limit = np.sqrt(beds[0].bed.g * self._size)
         self._place, self._turn = physics.field("xpos"), physics.field("xmat")
         self._velocity, self._com = physics.field("cvel"), physics.field("subtree_com")
         self._roots = physics.model.body_rootid[self._bodies]

@@ -12,7 +12,7 @@ import numpy as np
 from mujoco.batch import Batch
 
 from rftsim.bench.subjects import SUBJECTS, in_motion, put
-from rftsim.law.layout import SAND_FIELDS
+from rftsim.law.layout import HEADER, record
 from rftsim.model.readout import instances, work
 from rftsim.surface.triangles import Array
 
@@ -84,10 +84,10 @@ def randomised(model: mujoco.MjModel, batch: Batch, seed: int) -> None:
     """Give each simulation of a batch a sand of its own."""
     rng, numbers = np.random.default_rng(seed), batch.expand("numeric_data")
     for bed in instances(model):
-        first = (bed.sand.ctypes.data - model.numeric_data.ctypes.data) // bed.sand.itemsize
+        beds = bed.beds_in(numbers)
         for field, ends in DRAWN.items():
             low, high = np.log(ends)
-            numbers[:, first + SAND_FIELDS.index(field)] *= np.exp(rng.uniform(low, high, size=len(numbers)))
+            beds[field] *= np.exp(rng.uniform(low, high, size=len(numbers)))
 
 
 def _case(name: str, law: str, rounds: int, report: Callable[[str], Any]) -> list[Timed]:
@@ -105,7 +105,7 @@ def _case(name: str, law: str, rounds: int, report: Callable[[str], Any]) -> lis
     for ground, model in found.items():
         seconds = statistics.median(times[ground])
         shares = {n: (1.0 / statistics.median(own[ground]), 1.0 / _ratio(own, ground)) for n, own in batches.items()}
-        triangles = sum(int(surface[14]) for bed in instances(model) for surface in bed.bodies.values())
+        triangles = sum(int(record(one, HEADER).ntri) for bed in instances(model) for one in bed.bodies.values())
         costs = seconds, _ratio(times, ground), model.opt.timestep / seconds
         rows.append(Timed(name, law, ground, triangles, *costs, *_work_per_step(singles[ground]), shares))
     return rows

@@ -1,4 +1,4 @@
-"""What a triangle costs: the compiled loop by size, against NumPy, and against the arithmetic of this machine."""
+"""The cost of a triangle: the compiled loop by size, against NumPy, and against the arithmetic of this machine."""
 
 import functools
 import importlib.util
@@ -9,20 +9,17 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from rftsim.law.laws import get_law
-from rftsim.law.layout import BLOCK, COLUMNS, pack_sand, pack_surface
+from rftsim.law.layout import BLOCK, COLUMNS, pack_bed, pack_surface
 from rftsim.reduction.reduce import middle
 from rftsim.sand.free_surface import FreeSurface
 from rftsim.sand.medium import Sand
 from rftsim.surface import solids
 from rftsim.surface.triangles import Array, Surface
-
-if TYPE_CHECKING:
-    from rftsim.bench.single import Single
 
 SIZES: Final = (16, 64, 256, 1024, 4096, 20480, 81920, 327680, 1048576)
 """Triangles of the bodies."""
@@ -30,8 +27,6 @@ LINEAR: Final = 1000
 """Sizes from here on count for the exponent."""
 SHORTEST: Final = 2e-3
 """Time that one measurement takes at least [s]."""
-SINGLE: Final = 20480
-"""Triangles on which single precision is measured."""
 LITERAL: Final = 100_000
 """Sizes up to here are timed in NumPy, too."""
 ROUNDS: Final = 30
@@ -45,7 +40,7 @@ _ROOTS: Final = 2
 
 
 class Cost(NamedTuple):
-    """What a body of one size costs."""
+    """The cost of a body of one size."""
 
     triangles: int
     seconds: float
@@ -59,7 +54,7 @@ class Cost(NamedTuple):
 
     @property
     def nanoseconds(self) -> float:
-        """Of one triangle."""
+        """The time of one triangle [ns], each body's divided by their number."""
         return 1e9 * self.seconds / self.triangles
 
     @property
@@ -74,7 +69,7 @@ class Cost(NamedTuple):
 
 
 class Arithmetic(NamedTuple):
-    """What the processor could do at best."""
+    """The least that the law's arithmetic takes of this processor."""
 
     operations: float
     """Floating-point operations of the compiled loop for each triangle; a fused multiplication and addition is one."""
@@ -94,14 +89,14 @@ def measure(sizes: tuple[int, ...], oracle: ModuleType | None, report: Callable[
     """
     from rftsim.bench import loops  # which numba compiles
 
-    sand = pack_sand(SAND, get_law(LAW), FreeSurface(), (0.0, 1.0, 0.0))
+    bed = pack_bed(SAND, get_law(LAW), FreeSurface(), (0.0, 1.0, 0.0))
     works: list[Callable[[int], Any]] = []
     bodies = []
     for size in sizes:
         surface = _ball(size)
         body = pack_surface(surface)
         bodies.append((body.nbytes, _leading(surface)))
-        works.append(functools.partial(loops.evaluate, sand, body, *_motion(surface), np.empty(6)))
+        works.append(functools.partial(loops.evaluate, bed, body, *_motion(surface), np.empty(6)))
         if oracle is not None and size <= LITERAL:
             works.append(functools.partial(_literal, oracle, surface))
     seconds = iter(_least(works, report))
@@ -117,22 +112,14 @@ def arithmetic() -> Arithmetic:
     """The law's operations, counted in the machine code of its loop, and the time that they take at least."""
     from rftsim.bench import loops  # which numba compiles
 
-    sand = pack_sand(SAND, get_law(LAW), FreeSurface(), (0.0, 1.0, 0.0))
+    bed = pack_bed(SAND, get_law(LAW), FreeSurface(), (0.0, 1.0, 0.0))
     surface = _ball(BLOCK)
     body = pack_surface(surface)
-    loops.sums(sand, body, *_motion(surface))
-    operations = _count(next(iter(loops.sums.inspect_asm().values())))
+    loops.law_loop(bed, body, *_motion(surface))
+    operations = _count(next(iter(loops.law_loop.inspect_asm().values())))
     numbers = np.linspace(0.0, 0.5, 512)
     (seconds,) = _least([functools.partial(loops.polynomials, numbers, np.empty(numbers.size))], lambda _: None)
     return Arithmetic(operations, 1e9 * operations * seconds / (numbers.size * _OPERATIONS))
-
-
-def single_precision() -> "Single":
-    """The law's loop in single precision, on a body of many triangles."""
-    from rftsim.bench import single  # which numba compiles
-
-    sand, surface = pack_sand(SAND, get_law(LAW), FreeSurface(), (0.0, 1.0, 0.0)), _ball(SINGLE)
-    return single.measure(sand, pack_surface(surface), _motion(surface), lambda works: _least(works, lambda _: None))
 
 
 def exponent(costs: list[Cost]) -> float:

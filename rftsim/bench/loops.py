@@ -1,21 +1,25 @@
-"""Compiled loops that are timed."""
+"""Compiled loops whose time is measured, or whose instructions are counted."""
 
 import numba  # not `from`: what measures the package is not part of what its machine code is made from
 
-from rftsim.law import exports, kernels, kinematics
-from rftsim.machine import link
-from rftsim.solver.linear_algebra import FASTMATH
+from rftsim.law import evaluate as laws
+from rftsim.law import exports, sums
+from rftsim.law.body import bed_at, body_at, header_at, medium_at
+from rftsim.law.frame import level_frame
+from rftsim.law.laws import CUBIC
+from rftsim.law.leading import SHARP, Edge
 
-link.load("law")("rftsim_wrench")  # by which name compiled code finds it from here on
+laws.linked()("rftsim_wrench")  # by which name compiled code finds it from here on
+_sums = sums.sums(CUBIC)
 
 
 @numba.njit
-def evaluate(sand, body, position, turn, velocity, omega, out, count):
-    """The wrench on a body, so many times."""
+def evaluate(bed, surface, position, turn, velocity, omega, out, count):
+    """The wrench on a body, evaluated so many times, into out (6,)."""
     for _ in range(count):
         exports.wrench(
-            sand.ctypes.data,
-            body.ctypes.data,
+            bed.ctypes.data,
+            surface.ctypes.data,
             position.ctypes.data,
             turn.ctypes.data,
             velocity.ctypes.data,
@@ -24,11 +28,12 @@ def evaluate(sand, body, position, turn, velocity, omega, out, count):
         )
 
 
-@numba.njit(fastmath=FASTMATH, error_model="numpy")
-def sums(sand, body, position, turn, velocity, omega):
-    """The law's loop alone, whose instructions are counted."""
-    frame, medium = kinematics.frame_of(sand, body, position, turn, velocity, omega), kinematics.medium_of(sand, body)
-    return kernels.sums_3d(body, frame, medium)
+@numba.njit(error_model="numpy")
+def law_loop(bed, surface, position, turn, velocity, omega):
+    """The loop of 3D-RFT alone, whose instructions are counted."""
+    at, edge = surface.ctypes.data, Edge(header_at(surface.ctypes.data).edge_on, SHARP)
+    frame = level_frame(bed_at(bed.ctypes.data), position, turn, velocity, omega)
+    return _sums(body_at(at), frame, medium_at(bed.ctypes.data), edge)
 
 
 @numba.njit(fastmath={"contract"}, forceinline=True)

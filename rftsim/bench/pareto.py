@@ -198,7 +198,7 @@ def _wrench_error(fine: Staged, staged: Staged) -> float:
     found = []
     for name, surface in fine.bed.surfaces.items():
         reach = sampled_reach(fine.model, fine.model.body(name).id, surface, SEED)
-        samples = reduce.draw(surface, bed.sand, reach, reduce.DEPTHS, SEED)
-        whole, reduced = (reduce.wrenches(s, bed.sand, samples) for s in (surface, staged.bed.surfaces[name]))
+        samples = reduce.draw(surface, bed.packed, reach, reduce.DEPTHS, SEED)
+        whole, reduced = (reduce.scaled_wrenches(s, bed.packed, samples) for s in (surface, staged.bed.surfaces[name]))
         found.append(reduce.errors(whole, reduced, samples.depth).max())
     return float(max(found))

@@ -25,10 +25,8 @@ def time_kernel(quick: bool, oracle: Path, plot: Path | None, json: bool) -> Non
     """Time a triangle by the size of the body: `rftsim bench kernel`."""
     picture = picture_in(plot, "kernel")
     sizes = tuple(size for size in kernel.SIZES if not quick or size <= 20480)
-    with progress("kernel", kernel.ROUNDS + 2, json) as report:
+    with progress("kernel", kernel.ROUNDS + 1, json) as report:
         limit = kernel.arithmetic()
-        report("kernel")
-        single = kernel.single_precision()
         report("kernel")
         found = kernel.measure(sizes, kernel.load_oracle(oracle), lambda _: report("kernel"))
     power = kernel.exponent(found)
@@ -45,18 +43,16 @@ def time_kernel(quick: bool, oracle: Path, plot: Path | None, json: bool) -> Non
             for cost in found
         ]
         head = {"law": kernel.LAW, "sizes": rows, "exponent": power}
-        print_json({**head, "arithmetic": limit._asdict(), "single_precision": single._asdict()})
+        print_json({**head, "arithmetic": limit._asdict()})
         return
     console = Console()
     console.print(_kernel_table(found, limit))
-    for line in (
+    print_line(
+        console,
         f"time grows with the {power:.3f}th power of the triangles from {kernel.LINEAR} on; the law's "
         f"{limit.operations:.0f} operations take {limit.nanoseconds:.2f} ns at least, and are spared the "
         f"{100 - 100 * found[-1].leading:.0f} % of the triangles that do not lead",
-        f"in single precision the loop takes {single.single_nanoseconds:.2f} ns for each of {single.triangles} "
-        f"triangles instead of {single.double_nanoseconds:.2f}, and its wrench errs by {single.error:.1g}",
-    ):
-        print_line(console, line)
+    )
     print_written(console, picture)
 
 

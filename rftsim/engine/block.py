@@ -3,15 +3,18 @@
 The numbers are found by name. A numeric is a body's surface, or a bed's parameters, where its name without the marker
 is the body's, or the instance's, name; so MJCF attachment may put any prefix and suffix around both.
 
-What belongs to an mjData (`plugin_data` is its number in the registry) is one block: int64 [number of bodies, numeric
-of the bed, (body, numeric of its surface) ...], then float64 [last wrench of each body (6), counters (COUNTERS), state
-after the step under way]. What must last is MuJoCo's `plugin_state`, and is brought up to date only when a step ends.
+What belongs to an mjData (`plugin_data` is its number in the registry) is one block: a record of BLOCK_HEAD, one of
+MEMBER for each body, each body's last wrench (WRENCH numbers), a record of COUNTERS, and the state after the step under
+way. What must last is MuJoCo's `plugin_state`, and is brought up to date only when a step ends.
 """
 
 import ctypes
-from typing import Final
+from typing import Any, Final, NamedTuple
+
+import numpy as np
 
 from rftsim.machine import registry
+from rftsim.machine.kernel import exact_kernel
 
 CHUNK: Final = 500
 """Numbers of one numeric: MuJoCo's XML reader takes no more. A surface goes on in the numerics behind its first."""
@@ -19,28 +22,61 @@ BODY_MARKER: Final = "rftsim-body:"
 SAND_MARKER: Final = "rftsim-sand:"
 WRENCH: Final = 6
 """Numbers of a wrench: force, then moment about the body's origin, in the world frame."""
-COUNTERS: Final = 7
-"""Evaluations, Jacobians and unsolved equations of the last force; then steps, and the sums of those three."""
-HEAD: Final = 2
-SIZE: Final = 8
+BLOCK_HEAD: Final = np.dtype([("nbody", "i8"), ("bed", "i8")])
+"""Number of bodies, and the numeric of the bed."""
+MEMBER: Final = np.dtype([("body", "i8"), ("numeric", "i8")])
+"""A body's id, and the numeric of its surface."""
+COUNTERS: Final = np.dtype(
+    [
+        *((name, "f8") for name in ("evaluations", "derivatives", "unsolved")),
+        *((name, "f8") for name in ("steps", "all_evaluations", "all_derivatives", "all_unsolved")),
+    ]
+)
+"""Cost of the last force, as the solver's WORK; then the number of steps, and the sums of the costs over them."""
+_HEAD: Final = BLOCK_HEAD.itemsize
+_MEMBER: Final = MEMBER.itemsize
+_WRENCH: Final = 8 * WRENCH
+_COUNTERS: Final = COUNTERS.itemsize
 
 
-def read_wrenches(number: int, owner: int, instance: int) -> list[tuple[int, tuple[float, ...]]]:
-    """Each body's id and last wrench, of the mjData at `owner` whose plugin data is `number`."""
-    n, entries, numbers = _read(number, owner, instance)
-    return [(entries[HEAD + 2 * k], tuple(numbers[WRENCH * k : WRENCH * (k + 1)])) for k in range(n)]
+@exact_kernel
+def wrenches_start(nbody: Any) -> Any:
+    """Bytes of a block before its wrenches."""
+    return _HEAD + _MEMBER * nbody
 
 
-def read_counters(number: int, owner: int, instance: int) -> tuple[float, ...]:
-    """Steps, evaluations, Jacobians and unsolved equations since the last reset."""
-    n, _, numbers = _read(number, owner, instance)
-    return tuple(numbers[WRENCH * n + 3 : WRENCH * n + COUNTERS])
+@exact_kernel
+def counters_start(nbody: Any) -> Any:
+    """Bytes of a block before its counters."""
+    return _HEAD + (_MEMBER + _WRENCH) * nbody
 
 
-def _read(
-    number: int, owner: int, instance: int
-) -> "tuple[int, ctypes.Array[ctypes.c_int64], ctypes.Array[ctypes.c_double]]":
+@exact_kernel
+def state_start(nbody: Any) -> Any:
+    """Bytes of a block before its state."""
+    return _HEAD + (_MEMBER + _WRENCH) * nbody + _COUNTERS
+
+
+class Block(NamedTuple):
+    """A block as Python sees it: views of its memory, which live no longer than the mjData."""
+
+    bodies: "np.ndarray[Any, np.dtype[np.int64]]"
+    """Ids of the bodies, shape (nbody,)."""
+    wrenches: "np.ndarray[Any, np.dtype[np.float64]]"
+    """Their last wrenches, shape (nbody, WRENCH)."""
+    counters: Any
+    """Record of COUNTERS."""
+
+
+def read_block(number: int, owner: int, instance: int) -> Block:
+    """The block of an instance in the mjData at `owner` whose plugin data is `number`."""
     address = registry.read_address(number, owner, instance)
-    n = ctypes.c_int64.from_address(address).value
-    entries = (ctypes.c_int64 * (HEAD + 2 * n)).from_address(address)
-    return n, entries, (ctypes.c_double * (WRENCH * n + COUNTERS)).from_address(address + ctypes.sizeof(entries))
+    n = int(_view(address, BLOCK_HEAD, 1)[0]["nbody"])
+    members = _view(address + _HEAD, MEMBER, n)
+    wrenches = _view(address + wrenches_start(n), np.dtype("f8"), WRENCH * n).reshape(n, WRENCH)
+    return Block(members["body"], wrenches, _view(address + counters_start(n), COUNTERS, 1)[0])
+
+
+def _view(address: int, dtype: "np.dtype[Any]", count: int) -> Any:
+    """Records at an address, shape (count,)."""
+    return np.frombuffer(memoryview((ctypes.c_char * (dtype.itemsize * count)).from_address(address)), dtype=dtype)

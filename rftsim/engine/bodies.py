@@ -2,8 +2,7 @@
 
 from typing import Any, NamedTuple
 
-from numba import njit
-
+from rftsim.machine.compiling import exact
 from rftsim.machine.memory import doubles, int32s, pointer
 
 
@@ -22,7 +21,7 @@ class Tree(NamedTuple):
     cdof: Any
 
 
-@njit
+@exact
 def tree(model, data, m, d):
     """Views of mjModel's and mjData's arrays, flat."""
     nbody, nv = pointer(m + model.nbody), pointer(m + model.nv)
@@ -40,14 +39,14 @@ def tree(model, data, m, d):
     )
 
 
-@njit
+@exact
 def arm(t, body, x):
     """From the point that cvel and cdof refer to, to a point x."""
     o = 3 * t.root[body]
     return x[0] - t.com[o], x[1] - t.com[o + 1], x[2] - t.com[o + 2]
 
 
-@njit
+@exact
 def twist(t, body, velocity_out, omega_out):
     """Fill the velocity of a body's origin and its angular velocity, (3,) each."""
     c = t.cvel[6 * body : 6 * body + 6]  # MuJoCo's cvel: angular first
@@ -58,7 +57,7 @@ def twist(t, body, velocity_out, omega_out):
     omega_out[0], omega_out[1], omega_out[2] = c[0], c[1], c[2]
 
 
-@njit
+@exact
 def last_dof(t, body):
     """The last degree of freedom that moves a body, or -1."""
     while body > 0 and t.dofnum[body] == 0:
@@ -66,7 +65,7 @@ def last_dof(t, body):
     return t.dofadr[body] + t.dofnum[body] - 1 if body > 0 else -1
 
 
-@njit
+@exact
 def add_wrench(t, body, x, force, moment, out):
     """Add a force at x and a moment on a body to a generalised force, through the body's Jacobian."""
     fx, fy, fz = force
@@ -81,8 +80,8 @@ def add_wrench(t, body, x, force, moment, out):
         dof = t.dof_parent[dof]
 
 
-@njit
-def jacobian(t, body, out):
+@exact
+def fill_jacobian(t, body, out):
     """Jacobian of a body's twist about its origin, velocity first, (6, nv)."""
     r = arm(t, body, t.xpos[3 * body : 3 * body + 3])
     for row in range(6):

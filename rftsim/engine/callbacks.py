@@ -2,25 +2,26 @@
 
 from typing import Final
 
-from numba import njit, types
+from numba import types
 
 from rftsim.engine import explicit, implicit, instance, offsets
-from rftsim.engine.block import HEAD, SIZE, WRENCH
+from rftsim.engine.block import WRENCH
 from rftsim.engine.layout import CONSTANTS
 from rftsim.machine import claims
+from rftsim.machine.compiling import inline
 from rftsim.machine.exports import address, entry
 from rftsim.machine.memory import doubles, int32s, pointer
-from rftsim.machine.registry import SIZE as ENTRIES
+from rftsim.machine.registry import PLACES
+from rftsim.solver import linear_algebra
 
 _RK4: Final = CONSTANTS["rk4"]
 _PASSIVE: Final = CONSTANTS["passive"]
 
 
-@njit(forceinline=True)
+@inline
 def _sense(model, data, m, d, number):
     """Copy each body's wrench to the sensors that name it."""
     address = instance.block_of(model, data, m, d, number)
-    table, wrenches = instance.table(address), instance.wrenches(address)
     nsensor = pointer(m + model.nsensor)
     plugins = int32s(pointer(m + model.sensor_plugin), nsensor)
     objects = int32s(pointer(m + model.sensor_objid), nsensor)
@@ -28,57 +29,56 @@ def _sense(model, data, m, d, number):
     for sensor in range(nsensor):
         if plugins[sensor] != number:
             continue
-        out = doubles(pointer(d + data.sensordata) + SIZE * start[sensor], WRENCH)
-        for k in range(table[0]):
-            if table[HEAD + 2 * k] == objects[sensor]:
-                for i in range(WRENCH):
-                    out[i] = wrenches[WRENCH * k + i]
+        out = doubles(pointer(d + data.sensordata) + 8 * start[sensor], WRENCH)
+        for k in range(instance.head(address).nbody):
+            if instance.body(address, k) == objects[sensor]:
+                linear_algebra.copy(instance.wrench(address, k), out)
 
 
 @entry(types.intc, address, types.intc, types.intc)
 def nsensordata(m, number, sensor):
-    """Numbers of a sensor."""
+    """The number of numbers of a sensor."""
     return WRENCH
 
 
 @entry(types.intc, address, address, types.intc)
 def init(m, d, number):
-    """Make an instance's block in new data."""
+    """Make an instance's block in new data; -1 where it cannot be."""
     return instance.initialise(offsets.model(), offsets.data(), m, d, number)
 
 
 @entry(types.void, address, types.intc)
 def destroy(d, number):
-    """Release it."""
+    """Release the block of an instance in data that go."""
     instance.destroy(offsets.data(), d, number)
 
 
 @entry(types.void, address, address, address, types.intc)
 def copy(target, m, origin, number):
-    """Copy it to other data."""
+    """Copy the block of an instance to other data."""
     instance.copy(offsets.model(), offsets.data(), target, m, origin, number)
 
 
 @entry(types.void, address, address, address, types.intc)
 def reset(m, state, memory, number):
-    """Forget what was."""
-    block = claims.address(memory) if 0 <= memory < ENTRIES else 0
+    """Forget the past of an instance in data that are reset."""
+    block = claims.address(memory) if 0 <= memory < PLACES else 0
     if block != 0:
         instance.forget(block)
-    lasting = doubles(state, instance.state_size(offsets.model(), m, number))
+    lasting = doubles(state, instance.granted_state(offsets.model(), m, number))
     for i in range(lasting.size):
         lasting[i] = 0.0
 
 
 @entry(types.void, address, address, types.intc)
 def advance(m, d, number):
-    """End a step."""
+    """End a step of an instance: keep what must last."""
     instance.keep(offsets.model(), offsets.data(), m, d, number)
 
 
 @entry(types.intc, address, types.intc)
 def explicit_nstate(m, number):
-    """Numbers that last from step to step."""
+    """The number of numbers that last from step to step."""
     return 0
 
 
@@ -94,7 +94,7 @@ def explicit_compute(m, d, number, capability):
 
 @entry(types.intc, address, types.intc)
 def implicit_nstate(m, number):
-    """Numbers that last from step to step."""
+    """The number of numbers that last from step to step."""
     return instance.wanted_state(offsets.model(), m, number)
 
 

@@ -6,15 +6,19 @@ bias and the constraints' reference are the last step's. They are computed here 
 
 from typing import Final
 
-from numba import njit
-
-from rftsim.engine import block, bodies, external, instance
+from rftsim.engine import bodies, external, instance
 from rftsim.engine.layout import CONSTANTS
-from rftsim.law import exports_ahead
-from rftsim.machine.memory import doubles, int32s, int64s, pointer, release, room, take
-from rftsim.solver import equation, linear_algebra, native_step
-from rftsim.solver.equation import AT, ENTRIES, KIND, VECTOR
+from rftsim.law import exports
+from rftsim.law.body import header_at
+from rftsim.machine.compiling import inline
+from rftsim.machine.memory import doubles, int32s, matrix, pointer, release, stack_doubles, take
+from rftsim.solver import equation, linear_algebra, time_step
+from rftsim.solver.equation import KIND, TABLE
 
+_K: Final = 0
+_B: Final = 1
+_I: Final = 2
+"""Where MuJoCo's efc_KBIP holds a row's stiffness, damping and impedance."""
 _UNDAMPED: Final = CONSTANTS["no_euler_damping"] | CONSTANTS["no_damping"]
 _EULER: Final = CONSTANTS["euler"]
 _IMPLICIT: Final = CONSTANTS["implicit"]
@@ -31,10 +35,10 @@ _KIND: Final = {
 _KINDS: Final = tuple(_KIND[name] for name in sorted(_KIND, key=CONSTANTS.__getitem__))
 
 
-@njit(forceinline=True)
+@inline
 def _fill_mass(model, data, m, d, p):
     """The mass matrix, from its lower triangle in rows."""
-    out = equation.square(p, AT.plain_mass)
+    out = equation.plain_mass(p)
     nv = out.shape[0]
     number = int32s(pointer(m + model.M_rownnz), nv)
     start = int32s(pointer(m + model.M_rowadr), nv)
@@ -50,10 +54,10 @@ def _fill_mass(model, data, m, d, p):
             out[column[k], i] = value[k]
 
 
-@njit(forceinline=True)
+@inline
 def _fill_drag(model, data, m, d, p):
     """What the integrator takes implicitly, over the time step; whether there is any."""
-    out = equation.square(p, AT.drag)
+    out = equation.drag(p)
     nv = out.shape[0]
     for i in range(nv):
         for k in range(nv):
@@ -83,12 +87,12 @@ def _fill_drag(model, data, m, d, p):
     return True
 
 
-@njit(forceinline=True)
+@inline
 def _fill_force(model, data, m, d, t, p):
     """All smooth forces of this step but the sand's."""
     bias = pointer(d + data.qfrc_bias)
     external.rne(m, d, 0, bias)
-    out = equation.of_dofs(p, AT.smooth_force)
+    out = equation.smooth_force(p)
     nv = out.size
     passive, actuator = doubles(pointer(d + data.qfrc_passive), nv), doubles(pointer(d + data.qfrc_actuator), nv)
     applied, weight = doubles(pointer(d + data.qfrc_applied), nv), doubles(bias, nv)
@@ -106,40 +110,38 @@ def _fill_force(model, data, m, d, t, p):
             bodies.add_wrench(t, body, x, (f[0], f[1], f[2]), (f[3], f[4], f[5]), out)
 
 
-@njit(forceinline=True)
-def _fill_rows(model, data, contact, m, d, p, dragged):
-    """MuJoCo's constraint rows."""
-    n, nv = equation.number(p, AT.nrow), equation.number(p, AT.nv)
-    if n == 0:
+@inline
+def _fill_row_jacobian(model, data, m, d, p):
+    """The Jacobian of MuJoCo's constraint rows, from its sparse or dense form."""
+    jacobian, n, nv = equation.row_jacobian(p), equation.head(p).nrow, equation.head(p).nv
+    if not external.is_sparse(m):
+        linear_algebra.copy_matrix(matrix(pointer(d + data.efc_J), n, nv), jacobian)
         return
-    external.reference_constraint(m, d)
-    kind, bound = int64s(equation.number(p, AT.row_kind), n), equation.of_rows(p, AT.row_bound)
-    damping, spring = equation.of_rows(p, AT.row_damping), equation.of_rows(p, AT.row_spring)
+    for i in range(n):
+        for k in range(nv):
+            jacobian[i, k] = 0.0
+    number = int32s(pointer(d + data.efc_J_rownnz), n)
+    start = int32s(pointer(d + data.efc_J_rowadr), n)
+    total = start[n - 1] + number[n - 1]
+    column, value = int32s(pointer(d + data.efc_J_colind), total), doubles(pointer(d + data.efc_J), total)
+    for i in range(n):
+        for k in range(start[i], start[i] + number[i]):
+            jacobian[i, column[k]] = value[k]
+
+
+@inline
+def _fill_row_laws(data, contact, d, p):
+    """What the force of each constraint row depends on: its kind, bound, damping and spring."""
+    n = equation.head(p).nrow
+    kind, bound = equation.row_kind(p), equation.row_bound(p)
+    damping, spring = equation.row_damping(p), equation.row_spring(p)
     kinds, owner = int32s(pointer(d + data.efc_type), n), int32s(pointer(d + data.efc_id), n)
-    linear_algebra.copy(doubles(pointer(d + data.efc_D), n), equation.of_rows(p, AT.first_stiffness))
-    linear_algebra.copy(doubles(pointer(d + data.efc_aref), n), equation.of_rows(p, AT.first_reference))
-    loss, kbip = doubles(pointer(d + data.efc_frictionloss), n), doubles(pointer(d + data.efc_KBIP), 4 * n)
-    jacobian = equation.rows_by_dofs(p, AT.row_jacobian)
-    if external.is_sparse(m):
-        for i in range(n):
-            for k in range(nv):
-                jacobian[i, k] = 0.0
-        number = int32s(pointer(d + data.efc_J_rownnz), n)
-        start = int32s(pointer(d + data.efc_J_rowadr), n)
-        total = start[n - 1] + number[n - 1]
-        column, value = int32s(pointer(d + data.efc_J_colind), total), doubles(pointer(d + data.efc_J), total)
-        for i in range(n):
-            for k in range(start[i], start[i] + number[i]):
-                jacobian[i, column[k]] = value[k]
-    else:
-        value = doubles(pointer(d + data.efc_J), n * nv)
-        for i in range(n):
-            for k in range(nv):
-                jacobian[i, k] = value[i * nv + k]
+    loss, kbip = doubles(pointer(d + data.efc_frictionloss), n), matrix(pointer(d + data.efc_KBIP), n, 4)
     inside = 0  # rows of the elliptic contact at hand
     for i in range(n):
         kind[i], bound[i] = _KINDS[kinds[i]], loss[i]
-        damping[i], spring[i] = kbip[4 * i + 1], kbip[4 * i] * kbip[4 * i + 2]
+        stiffness, damping[i], impedance = kbip[i, _K], kbip[i, _B], kbip[i, _I]
+        spring[i] = stiffness * impedance
         if kind[i] >= KIND.contact:  # a pyramid's rows mix gap and slip
             spring[i] = 0.0
         if kind[i] == KIND.cone:
@@ -150,79 +152,83 @@ def _fill_rows(model, data, contact, m, d, p, dragged):
             else:
                 kind[i] = KIND.tangent
                 bound[i] = doubles(at + contact.friction, 5)[inside - 1]
-    seen = equation.rows_by_dofs(p, AT.row_drag)
-    if not dragged:
-        for i in range(n):
-            for k in range(nv):
-                seen[i, k] = 0.0
+
+
+@inline
+def _fill_rows(model, data, contact, m, d, p, dragged):
+    """MuJoCo's constraint rows."""
+    n, nv = equation.head(p).nrow, equation.head(p).nv
+    if n == 0:
         return
-    lu, order = equation.square(p, AT.mass_factors), equation.order(p, AT.mass_order)
-    linear_algebra.factor_of(equation.square(p, AT.plain_mass), lu, order)
-    solved, drag = equation.vector(p, VECTOR.change), equation.square(p, AT.drag)
+    external.reference_constraint(m, d)
+    linear_algebra.copy(doubles(pointer(d + data.efc_D), n), equation.first_stiffness(p))
+    linear_algebra.copy(doubles(pointer(d + data.efc_aref), n), equation.first_reference(p))
+    _fill_row_jacobian(model, data, m, d, p)
+    _fill_row_laws(data, contact, d, p)
+    jacobian, seen, drag = equation.row_jacobian(p), equation.row_drag(p), equation.drag(p)
     for i in range(n):
-        linear_algebra.substitute(lu, order, jacobian[i], solved)
         for k in range(nv):
             seen[i, k] = 0.0
+    if not dragged:
+        return
+    factors, order, solved = equation.mass_factors(p), equation.mass_order(p), equation.change(p)
+    linear_algebra.factor_of(equation.plain_mass(p), factors, order)
+    for i in range(n):
+        linear_algebra.substitute(factors, order, jacobian[i], solved)
         linear_algebra.add_transposed(drag, solved, 1.0, seen[i])
 
 
-@njit(forceinline=True)
-def _fill_bodies(model, m, t, table, p):
-    """The bodies of the instance."""
-    n, v, w = table[0], doubles(room(3), 3), doubles(room(3), 3)
+@inline
+def _fill_bodies(model, m, t, address, p):
+    """The bodies of the instance whose block is at an address."""
+    v, w = doubles(stack_doubles(3), 3), doubles(stack_doubles(3), 3)
     numerics = int32s(pointer(m + model.numeric_adr), pointer(m + model.nnumeric))
     first = pointer(m + model.numeric_data)
-    lengths, surfaces = (
-        doubles(equation.number(p, AT.length), n),
-        int64s(equation.number(p, AT.surface), n),
-    )
-    sand = first + block.SIZE * numerics[table[1]]
-    int64s(p, ENTRIES)[AT.sand] = sand
-    for k in range(n):
-        body, field = table[block.HEAD + 2 * k], table[block.HEAD + 2 * k + 1]
-        surfaces[k] = first + block.SIZE * numerics[field]
-        lengths[k] = doubles(surfaces[k], 16)[15]
-        bodies.jacobian(t, body, equation.body_jacobian(p, k))
-        r, f = equation.body_rotation(p, k), equation.body_frame(p, k)
+    lengths, surfaces = equation.length(p), equation.surface(p)
+    sand = first + 8 * numerics[instance.head(address).bed]
+    equation.head(p).sand = sand
+    for k in range(instance.head(address).nbody):
+        body = instance.body(address, k)
+        surfaces[k] = first + 8 * numerics[instance.numeric_of(address, k)]
+        lengths[k] = header_at(surfaces[k]).gyration
+        bodies.fill_jacobian(t, body, equation.jacobian(p, k))
+        r, f = equation.rotation(p, k), equation.frame(p, k)
         linear_algebra.copy(t.xmat[9 * body : 9 * body + 9], r)
         bodies.twist(t, body, v, w)
         x = t.xpos[3 * body : 3 * body + 3].ctypes.data
-        exports_ahead.frame(sand, surfaces[k], x, r.ctypes.data, v.ctypes.data, w.ctypes.data, f.ctypes.data)
+        exports.frame(sand, surfaces[k], x, r.ctypes.data, v.ctypes.data, w.ctypes.data, f.ctypes.data)
 
 
-@njit(forceinline=True)
+@inline
 def press(model, data, contact, m, d, number):
     """Solve for the sand's force at the end of the step and add it to qfrc_passive."""
     address = instance.block_of(model, data, m, d, number)
-    table = instance.table(address)
-    nv, nbody = pointer(m + model.nv), table[0]
-    old = instance.lasting(model, data, m, d, number)
-    new = instance.pending(address, old.size)
-    counted, wrenches = instance.counters(address), instance.wrenches(address)
+    nv, nbody = pointer(m + model.nv), instance.head(address).nbody
+    old, wrenches = instance.lasting(model, data, m, d, number), instance.all_wrenches(address)
     for i in range(wrenches.size):
         wrenches[i] = 0.0
-    counted[0] = counted[1] = counted[2] = 0.0
+    instance.count(address, 0.0)
     rows = int32s(d + data.nefc, 1)[0]
-    p = room(ENTRIES)
-    entries = int64s(p, ENTRIES)
-    memory = take(equation.lay_out(p, 0 * nbody, nbody, nv, rows, old.size))
-    equation.lay_out(p, memory, nbody, nv, rows, old.size)
-    entries[AT.old], entries[AT.new] = old.ctypes.data, new.ctypes.data
-    entries[AT.counts] = counted.ctypes.data
-    linear_algebra.copy(doubles(pointer(d + data.qvel), nv), equation.of_dofs(p, AT.velocity))
-    doubles(entries[AT.timestep], 1)[0] = doubles(m + model.opt_timestep, 1)[0]
+    p = stack_doubles(TABLE)
+    memory = take(equation.lay_out(p, 0 * nbody, nbody, nv, rows))
+    equation.lay_out(p, memory, nbody, nv, rows)
+    head = equation.head(p)
+    head.old, head.new = old.ctypes.data, instance.pending(address, old.size).ctypes.data
+    head.work = instance.counters(address)
+    linear_algebra.copy(doubles(pointer(d + data.qvel), nv), equation.velocity(p))
+    equation.numbers(p).timestep = doubles(m + model.opt_timestep, 1)[0]
     t = bodies.tree(model, data, m, d)
-    _fill_bodies(model, m, t, table, p)
-    if native_step.is_needed(p) != 0:
+    _fill_bodies(model, m, t, address, p)
+    if time_step.is_needed(p) != 0:
         external.fwd_actuation(m, d)  # before the drag, which leaves out actuators at their limits
         _fill_mass(model, data, m, d, p)
         dragged = _fill_drag(model, data, m, d, p)
         _fill_force(model, data, m, d, t, p)
         _fill_rows(model, data, contact, m, d, p, dragged)
-        native_step.step(p)
+        time_step.step(p)
         force = doubles(pointer(d + data.qfrc_passive), nv)
-        q = equation.of_dofs(p, AT.out)
+        q = equation.out(p)
         for i in range(nv):
             force[i] += q[i]
-        linear_algebra.copy(doubles(entries[AT.wrench], wrenches.size), wrenches)
+        linear_algebra.copy(equation.all_wrenches(p), wrenches)
     release(memory)

@@ -1,17 +1,26 @@
 """A plugin instance for compiled code: its bodies and its block of memory, see `block`."""
 
-from numba import njit
-
-from rftsim.engine.block import BODY_MARKER, COUNTERS, HEAD, SAND_MARKER, SIZE, WRENCH
-from rftsim.law.layout import SAND_SIZE
+from rftsim.engine import block
+from rftsim.engine.block import BODY_MARKER, SAND_MARKER, WRENCH
+from rftsim.law.layout import BED, numbers_in
 from rftsim.machine import claims
+from rftsim.machine.compiling import exact, inline
 from rftsim.machine.memory import characters, doubles, int32s, int64s, pointer
+from rftsim.machine.records import record_at
 from rftsim.solver import state
 
 _BODY_MARKER, _SAND_MARKER = BODY_MARKER.encode(), SAND_MARKER.encode()
+_BED = numbers_in(BED)
+_MEMBER = block.MEMBER.itemsize
+_HEAD = block.BLOCK_HEAD.itemsize
+_COUNTERS = numbers_in(block.COUNTERS)
+
+head = record_at(block.BLOCK_HEAD)
+"""The record BLOCK_HEAD of the block at an address."""
+_member_at, _counters_at = record_at(block.MEMBER), record_at(block.COUNTERS)
 
 
-@njit
+@exact
 def _is_marked(names, numeric, marker, owner):
     """Whether the name at `numeric` is the name at `owner` with the marker inserted somewhere."""
     same = 0
@@ -31,7 +40,7 @@ def _is_marked(names, numeric, marker, owner):
     return False
 
 
-@njit
+@exact
 def _find_numeric(model, m, marker, owner):
     names = characters(pointer(m + model.names))
     count = pointer(m + model.nnumeric)
@@ -42,16 +51,16 @@ def _find_numeric(model, m, marker, owner):
     return -1
 
 
-@njit
+@exact
 def numeric(model, m, i):
     """A numeric field of the model, as a view."""
     count = pointer(m + model.nnumeric)
     start = int32s(pointer(m + model.numeric_adr), count)[i]
     size = int32s(pointer(m + model.numeric_size), count)[i]
-    return doubles(pointer(m + model.numeric_data) + SIZE * start, size)
+    return doubles(pointer(m + model.numeric_data) + 8 * start, size)
 
 
-@njit
+@exact
 def count_bodies(model, m, instance):
     """How many bodies name the instance."""
     nbody = pointer(m + model.nbody)
@@ -62,25 +71,25 @@ def count_bodies(model, m, instance):
     return n
 
 
-@njit
+@exact
 def wanted_state(model, m, instance):
     """Numbers of plugin_state that the implicit force wants."""
     return state.state_size(count_bodies(model, m, instance), pointer(m + model.nv))
 
 
-@njit
-def state_size(model, m, instance):
+@exact
+def granted_state(model, m, instance):
     """Numbers of plugin_state that the instance has."""
     return int32s(pointer(m + model.plugin_statenum), pointer(m + model.nplugin))[instance]
 
 
-@njit
+@exact
 def _slot(data, d, instance):
     """Where mjData keeps the number of an instance's block, (1,)."""
-    return int64s(pointer(d + data.plugin_data) + SIZE * instance, 1)
+    return int64s(pointer(d + data.plugin_data) + 8 * instance, 1)
 
 
-@njit(forceinline=True)
+@inline
 def block_of(model, data, m, d, instance):
     """The address of an instance's block; made anew where mjData lost it, as it does when it is pickled."""
     slot = _slot(data, d, instance)
@@ -92,49 +101,68 @@ def block_of(model, data, m, d, instance):
     return claims.address(slot[0])
 
 
-@njit
-def table(address):
-    """The integers of a block."""
-    return int64s(address, HEAD + 2 * pointer(address))
+@exact
+def body(address, k):
+    """The id of the k-th body of a block."""
+    return _member_at(address + _HEAD + _MEMBER * k).body
 
 
-@njit
-def wrenches(address):
-    """The last wrench of each body, (6 n,)."""
-    n = pointer(address)
-    return doubles(address + SIZE * (HEAD + 2 * n), WRENCH * n)
+@exact
+def numeric_of(address, k):
+    """The numeric of the surface of the k-th body of a block."""
+    return _member_at(address + _HEAD + _MEMBER * k).numeric
 
 
-@njit
+@exact
+def wrench(address, k):
+    """The last wrench of the k-th body of a block, (WRENCH,)."""
+    return doubles(address + block.wrenches_start(head(address).nbody) + 8 * WRENCH * k, WRENCH)
+
+
+@exact
+def all_wrenches(address):
+    """The last wrenches of all bodies of a block, (WRENCH n,)."""
+    n = head(address).nbody
+    return doubles(address + block.wrenches_start(n), WRENCH * n)
+
+
+@exact
 def counters(address):
-    """The counters of a block, (COUNTERS,)."""
-    n = pointer(address)
-    return doubles(address + SIZE * (HEAD + (2 + WRENCH) * n), COUNTERS)
+    """The address of a block's counters."""
+    return address + block.counters_start(head(address).nbody)
 
 
-@njit
+@exact
+def count(address, evaluations):
+    """Set the cost of the last force of a block to so many evaluations and nothing else."""
+    counted = _counters_at(counters(address))
+    counted.evaluations, counted.derivatives, counted.unsolved = evaluations, 0.0, 0.0
+
+
+@exact
 def pending(address, size):
     """The state after the step under way, (size,)."""
-    n = pointer(address)
-    return doubles(address + SIZE * (HEAD + (2 + WRENCH) * n + COUNTERS), size)
+    return doubles(address + block.state_start(head(address).nbody), size)
 
 
-@njit
+@exact
+def _words(model, m, instance):
+    """Words of an instance's block."""
+    start = block.state_start(count_bodies(model, m, instance))
+    return start // 8 + granted_state(model, m, instance)
+
+
+@exact
 def lasting(model, data, m, d, instance):
     """The state after the last step, a view of MuJoCo's plugin_state."""
     start = int32s(pointer(m + model.plugin_stateadr), pointer(m + model.nplugin))[instance]
-    return doubles(pointer(d + data.plugin_state) + SIZE * start, state_size(model, m, instance))
+    return doubles(pointer(d + data.plugin_state) + 8 * start, granted_state(model, m, instance))
 
 
-@njit
+@exact
 def initialise(model, data, m, d, instance):
     """Make the block of an instance; -1 where a body or the bed has no numbers."""
-    n = count_bodies(model, m, instance)
-    nbody = pointer(m + model.nbody)
-    plugins = int32s(pointer(m + model.body_plugin), nbody)
-    names = int32s(pointer(m + model.name_bodyadr), nbody)
-    instances = int32s(pointer(m + model.name_pluginadr), pointer(m + model.nplugin))
-    words = HEAD + (2 + WRENCH) * n + COUNTERS + state_size(model, m, instance)
+    words = _words(model, m, instance)
     number = claims.make(-1, d, instance, words)
     if number < 0:
         return -1
@@ -142,25 +170,34 @@ def initialise(model, data, m, d, instance):
     blank = int64s(address, words)
     for i in range(words):
         blank[i] = 0
-    blank[0] = n
-    entries = table(address)
-    entries[1] = _find_numeric(model, m, _SAND_MARKER, instances[instance])
-    complete = entries[1] >= 0 and numeric(model, m, entries[1]).size == SAND_SIZE
-    k = HEAD
-    for body in range(nbody):
-        if plugins[body] == instance:
-            entries[k] = body
-            entries[k + 1] = _find_numeric(model, m, _BODY_MARKER, names[body])
-            complete = complete and entries[k + 1] >= 0
-            k += 2
-    if not complete:
+    if not _find_numerics(model, m, instance, address):
         claims.drop(number)
         return -1
     _slot(data, d, instance)[0] = number
     return 0
 
 
-@njit
+@exact
+def _find_numerics(model, m, instance, address):
+    """Fill a block's head and members; whether the bed and each body have numbers."""
+    nbody = pointer(m + model.nbody)
+    plugins = int32s(pointer(m + model.body_plugin), nbody)
+    names = int32s(pointer(m + model.name_bodyadr), nbody)
+    instances = int32s(pointer(m + model.name_pluginadr), pointer(m + model.nplugin))
+    bed = _find_numeric(model, m, _SAND_MARKER, instances[instance])
+    head(address).bed, found = bed, 0
+    complete = bed >= 0 and numeric(model, m, bed).size == _BED
+    for body in range(nbody):
+        if plugins[body] == instance:
+            member = _member_at(address + _HEAD + _MEMBER * found)
+            member.body, member.numeric = body, _find_numeric(model, m, _BODY_MARKER, names[body])
+            complete = complete and member.numeric >= 0
+            found += 1
+    head(address).nbody = found
+    return complete
+
+
+@exact
 def destroy(data, d, instance):
     """Release the block of an instance."""
     number = claims.find(_slot(data, d, instance)[0], d, instance)
@@ -168,27 +205,27 @@ def destroy(data, d, instance):
         claims.drop(number)
 
 
-@njit
+@exact
 def copy(model, data, target, m, origin, instance):
     """Give another mjData a copy of the block."""
-    size = HEAD + (2 + WRENCH) * count_bodies(model, m, instance) + COUNTERS + state_size(model, m, instance)
-    block = int64s(block_of(model, data, m, origin, instance), size)
+    size = _words(model, m, instance)
+    original = int64s(block_of(model, data, m, origin, instance), size)
     number = claims.make(_slot(data, target, instance)[0], target, instance, size)
     fresh = int64s(claims.address(number), size)
     for i in range(size):
-        fresh[i] = block[i]
+        fresh[i] = original[i]
     _slot(data, target, instance)[0] = number
 
 
-@njit
+@exact
 def forget(address):
-    """Clear the wrenches and counters."""
-    for values in (wrenches(address), counters(address)):
-        for i in range(values.size):
-            values[i] = 0.0
+    """Clear the wrenches and counters of the block at an address."""
+    past = doubles(address + block.wrenches_start(head(address).nbody), all_wrenches(address).size + _COUNTERS)
+    for i in range(past.size):
+        past[i] = 0.0
 
 
-@njit(forceinline=True)
+@inline
 def keep(model, data, m, d, instance):
     """End a step: what it left pending lasts, and its work is counted."""
     address = block_of(model, data, m, d, instance)
@@ -196,7 +233,8 @@ def keep(model, data, m, d, instance):
     waiting = pending(address, now.size)
     for i in range(now.size):
         now[i] = waiting[i]
-    counted = counters(address)
-    counted[3] += 1.0
-    for k in range(3):
-        counted[4 + k] += counted[k]
+    counted = _counters_at(counters(address))
+    counted.steps += 1.0
+    counted.all_evaluations += counted.evaluations
+    counted.all_derivatives += counted.derivatives
+    counted.all_unsolved += counted.unsolved

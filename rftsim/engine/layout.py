@@ -1,4 +1,4 @@
-"""What compiled code must know of MuJoCo: where the fields of its structs lie, its constants, its functions.
+"""MuJoCo as compiled code must know it: where the fields of its structs lie, its constants, its functions.
 
 The offsets are computed from MuJoCo's own description of its structs and then compared with the addresses that its
 NumPy views report, so that a version of MuJoCo that lays them out otherwise is refused instead of misread.
@@ -62,7 +62,7 @@ class LayoutError(ImportError):
 
 
 class Model(NamedTuple):
-    """Byte offsets in mjModel."""
+    """Byte offsets of fields in MuJoCo's struct mjModel."""
 
     nbody: int
     nv: int
@@ -100,7 +100,7 @@ class Model(NamedTuple):
 
 
 class Data(NamedTuple):
-    """Byte offsets in mjData."""
+    """Byte offsets of fields in MuJoCo's struct mjData."""
 
     nefc: int
     contact: int
@@ -203,7 +203,7 @@ def publish() -> None:
 
 
 def layout() -> tuple[Model, Data, Contact]:
-    """The offsets, verified.
+    """The offsets of all three structs, verified against MuJoCo's own views.
 
     Raises:
         LayoutError: MuJoCo's description of its structs does not hold.

@@ -2,9 +2,10 @@
 
 from typing import Final
 
-from numba import njit, types
+from numba import types
 
 from rftsim.engine.layout import SYMBOL, Contact, Data, Model
+from rftsim.machine.compiling import inline
 from rftsim.machine.memory import named_address, tuples
 
 _MODEL: Final = len(Model._fields)
@@ -14,19 +15,19 @@ _place = named_address(SYMBOL)
 _read_model, _read_data, _read_contact = (tuples(size, types.int64) for size in (_MODEL, _DATA, _CONTACT))
 
 
-@njit(forceinline=True)
+@inline
 def model():
-    """Offsets in mjModel."""
+    """The byte offsets of fields in mjModel."""
     return Model(*_read_model(_place()))
 
 
-@njit(forceinline=True)
+@inline
 def data():
-    """Offsets in mjData."""
+    """The byte offsets of fields in mjData."""
     return Data(*_read_data(_place() + 8 * _MODEL))
 
 
-@njit(forceinline=True)
+@inline
 def contact():
-    """Offsets in mjContact."""
+    """The byte offsets of fields in mjContact, and its size."""
     return Contact(*_read_contact(_place() + 8 * (_MODEL + _DATA)))

@@ -11,6 +11,7 @@ from typing import Any, Final
 import mujoco
 
 from rftsim.engine import layout
+from rftsim.law import evaluate
 from rftsim.machine import link
 
 EXPLICIT: Final = "rftsim.sand"
@@ -58,7 +59,7 @@ def register(name: str) -> int:
     if memory.raw[:size].strip(b"\0") or memory.raw[size : size + 8] != b"\xff" * 8:
         raise layout.LayoutError(f"MuJoCo {mujoco.__version__} has another mjpPlugin; rftsim needs mujoco>=3.17,<4")
     layout.publish()
-    link.load("law")  # which the engine calls by name
+    evaluate.linked()  # which the engine calls by name
     address = link.load("engine", layout.GIVEN)
     plugin = _Plugin.from_buffer(memory)
     plugin.name = name.encode()

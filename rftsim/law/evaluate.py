@@ -2,35 +2,44 @@
 
 import ctypes
 import functools
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
+from rftsim.law.layout import GIVEN, HEADER, record
 from rftsim.machine import link
 from rftsim.surface.triangles import Array
 
 
+def linked() -> Callable[[str], int]:
+    """Link the laws' machine code into the process; what gives the address of an exported function by its name."""
+    return link.load("law", GIVEN)
+
+
 @functools.cache
 def _function(name: str, arguments: int) -> Any:
-    """A function of the machine code that takes addresses and gives nothing."""
-    return ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * arguments)(link.load("law")(name))
+    """An exported function that takes addresses and gives nothing."""
+    return ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * arguments)(linked()(name))
 
 
-def tractions(sand: Array, body: Array, xpos: Any, xmat: Any, velocity: Any, omega: Any) -> tuple[Array, Array]:
+def triangle_stresses(
+    bed: Array, surface: Array, xpos: Any, xmat: Any, velocity: Any, omega: Any
+) -> tuple[Array, Array]:
     """Each triangle's stress [Pa] in the body frame, (ntri, 3), and effective depth [m], (ntri,)."""
-    ntri = int(body[14])
-    arrays = [np.ascontiguousarray(x, dtype=float) for x in (sand, body, xpos, xmat, velocity, omega)]
+    ntri = int(record(surface, HEADER).ntri)
+    arrays = [np.ascontiguousarray(x, dtype=float) for x in (bed, surface, xpos, xmat, velocity, omega)]
     stress, depth = np.empty((ntri, 3)), np.empty(ntri)
     _function("rftsim_tractions", 8)(*(array.ctypes.data for array in (*arrays, stress, depth)))
     return stress, depth
 
 
-def wrenches(sand: Array, body: Array, xpos: Array, xmat: Array, velocity: Array, omega: Array) -> Array:
+def body_wrenches(bed: Array, surface: Array, xpos: Array, xmat: Array, velocity: Array, omega: Array) -> Array:
     """Force [N] and moment about the body's origin [N m], world frame, (n, 6).
 
     Args:
-        sand: Packed sand.
-        body: Packed surface.
+        bed: Packed sand.
+        surface: Packed surface.
         xpos: Positions of the body's origin [m], (n, 3).
         xmat: Rotations to the world frame, (n, 3, 3).
         velocity: Velocities of the body's origin [m/s], (n, 3).
@@ -39,7 +48,7 @@ def wrenches(sand: Array, body: Array, xpos: Array, xmat: Array, velocity: Array
     out = np.empty((len(xpos), 6))
     arrays = [*(np.ascontiguousarray(x, dtype=float) for x in (xpos, xmat, velocity, omega)), out]
     rows = zip(*(range(a.ctypes.data, a.ctypes.data + a.nbytes, a.strides[0]) for a in arrays), strict=True)
-    fixed = sand.ctypes.data, body.ctypes.data
+    fixed = bed.ctypes.data, surface.ctypes.data
     wrench = _function("rftsim_wrench", 7)
     for row in rows:
         wrench(*fixed, *row)

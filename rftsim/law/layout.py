@@ -1,110 +1,174 @@
-"""Sand and surface as plain arrays of numbers.
+"""Sand and surface as plain arrays of numbers, with names for what is where.
 
 This is the form in which MuJoCo's models carry them (custom numeric fields), so that copies, pickles, attachment and
-per-simulation values all come with the model. Compiled code reads them through `unpack`.
+per-simulation values all come with the model. The dtypes here are the only place that knows the order; NumPy and
+compiled code read by them.
 """
 
-from typing import Final
+from collections import namedtuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rftsim.errors import SandError
 from rftsim.law import tables
-from rftsim.law.laws import Law
+from rftsim.law.laws import RESPONSES, Law
+from rftsim.machine.kernel import exact_kernel
 from rftsim.sand.free_surface import FreeSurface
-from rftsim.sand.medium import Sand
+from rftsim.sand.medium import PARAMETERS, Sand
 from rftsim.surface.triangles import Array, Surface
 
-SAND_FIELDS: Final = (
-    *("law", "planar", "dynamic", "up_x", "up_y", "up_z", "offset", "plane_x", "plane_y", "plane_z"),
-    *("xi_n", "zeta", "mu_surf", "rho_c", "lambda_", "g"),
-)
-"""Entries of a packed sand, in order; behind them the coefficients of f1, f2 and f3, TERMS each."""
 TERMS: Final = len(tables.TABLE_C4)
-SAND_SIZE: Final = len(SAND_FIELDS) + 3 * TERMS
-STRENGTHS: Final = [SAND_FIELDS.index(name) for name in ("xi_n", "zeta")]
-"""Where a packed sand has what scales its force, under the 3D laws and under the 2D ones."""
+"""Coefficients of each of f1, f2 and f3."""
+_MEDIUM: Final = [("dynamic", "f8"), *((name, "f8") for name in PARAMETERS), ("table", "f8", (3, TERMS))]
 
-HEADER: Final = 19
-"""Numbers before the triangles of a packed surface.
+BED: Final = np.dtype([("response", "f8"), ("up", "f8", 3), ("offset", "f8"), ("plane", "f8", 3), *_MEDIUM])
+"""Packed sand: its law's place in RESPONSES, normal and offset of the free surface, normal of the plane of motion,
+whether the law is dynamic (0 or 1), the parameters (NaN where unknown), and the coefficients of f1, f2 and f3."""
 
-0 leading-edge tolerance; 1-3 and 4-6 lowest and highest corner; 7-9 wheel axis, 10-12 wheel centre, 13 wheel radius
-(zero where the body is no wheel); 14 number of triangles; 15 their root-mean-square
-distance from the origin; 16-18 direction at which the wheel's angles start.
-"""
-COLUMNS: Final = 7
-"""Numbers per triangle, each a column: centre (3), normal (3), area."""
+Medium = namedtuple("Medium", [name for name, *_ in _MEDIUM])  # type: ignore[misc]
+Medium.__doc__ = "The sand as a law reads it: fields of BED, which compiled loops keep in registers."
+
+HEADER: Final = np.dtype(
+    [
+        ("edge_on", "f8"),
+        ("lowest", "f8", 3),
+        ("highest", "f8", 3),
+        ("wheel_axis", "f8", 3),
+        ("wheel_centre", "f8", 3),
+        ("wheel_radius", "f8"),
+        ("ntri", "f8"),
+        ("gyration", "f8"),
+        ("rim_start", "f8", 3),
+    ]
+)
+"""What a packed surface starts with: leading-edge tolerance; lowest and highest corner [m]; axis, centre [m] and radius
+[m] of a wheel, zero where it is none; number of triangles; their root-mean-square distance from the origin [m]; the
+direction at which the wheel's angles start."""
+
+
+class Columns(NamedTuple):
+    """Numbers per triangle, each a column."""
+
+    x: int
+    y: int
+    z: int
+    nx: int
+    ny: int
+    nz: int
+    area: int
+
+
+COLUMN: Final = Columns(*range(len(Columns._fields)))
+"""Which column holds what: centre [m], outward normal, area [m^2]."""
 BLOCK: Final = 32
 """Triangles that are passed over together where the box of their centroids lies above the sand; the boxes stand behind
 the columns."""
-BOX: Final = 6
-"""Numbers of a box: centre and half its size, in the body frame."""
+BOX: Final = np.dtype([("centre", "f8", 3), ("half", "f8", 3)])
+"""A box: its centre, and half its size [m], in the body frame."""
 RIM: Final = 0.7
 """A wheel's triangle is of its rim where its normal is no nearer to the axis than by this cosine."""
 NO_RIM: Final = 9.0
 """Instead of the angle about the axis, of a wheel's other triangles. Behind its boxes stand each triangle's."""
 
+GIVEN: Final = repr(BED.descr)
+"""What machine code of the laws is made from beside its sources: the sand's parameters."""
 
-def pack_sand(sand: Sand, law: Law, free_surface: FreeSurface, plane: ArrayLike) -> Array:
-    """A sand bed as numbers: those of SAND_FIELDS, then the law's coefficients; (SAND_SIZE,).
+
+def numbers_in(dtype: "np.dtype[Any]") -> int:
+    """How many float64 a record of a dtype holds."""
+    return dtype.itemsize // 8
+
+
+def record(numbers: Array, dtype: "np.dtype[Any]") -> Any:
+    """The record that an array of numbers starts with; its fields are views, so writing one writes the array."""
+    return numbers[: numbers_in(dtype)].view(np.dtype((np.record, dtype)))[0]
+
+
+def pack_bed(sand: Sand, law: Law, terrain: FreeSurface, plane: ArrayLike) -> Array:
+    """Sand under a law as numbers, a record of BED.
 
     Raises:
-        SandError: The law is dynamic and the sand's density unknown.
+        SandError: The law reads a parameter that is unknown of the sand.
         ValueError: The plane's normal is not horizontal.
     """
-    up = np.array(free_surface.normal)
+    up = np.array(terrain.normal)
     normal = np.asarray(plane, dtype=float)
     length = np.linalg.norm(normal)
     if normal.shape != (3,) or not length > 0.0 or (law.planar and abs(normal @ up) > 1e-6 * length):
         raise ValueError(f"the normal of the plane of motion must be horizontal, as (0, 1, 0) is, not {plane!r}")
-    rho_c = sand.density() if law.dynamic else (sand.rho_c or 0.0)
-    flags = (law.code, law.planar, law.dynamic)
-    strength = (sand.xi_n, sand.zeta, sand.mu_surf, rho_c, sand.lambda_, sand.g)
-    table = np.zeros((3, TERMS))
-    for row, column in zip(table, tables.columns(law.table), strict=True):
+    unknown = [name for name in law.reads if getattr(sand, name) is None]
+    if "rho_c" in unknown:
+        sand.density()
+    if unknown:
+        raise SandError(f"the law {law.name} needs the sand's {unknown[0]}: give it")
+    numbers = np.zeros(numbers_in(BED))
+    bed = record(numbers, BED)
+    bed.response, bed.dynamic = RESPONSES.index(law.response), law.dynamic
+    bed.up, bed.offset, bed.plane = up, terrain.offset, normal / length
+    for name in PARAMETERS:
+        value = getattr(sand, name)
+        bed[name] = np.nan if value is None else value
+    for row, column in zip(bed.table, tables.columns(law.table), strict=True):
         row[: len(column)] = column
-    return np.array([*flags, *up, free_surface.offset, *(normal / length), *strength, *table.ravel()], dtype=float)
+    return numbers
 
 
 def pack_surface(surface: Surface) -> Array:
-    """A surface as numbers: a header of HEADER, then COLUMNS columns of ntri."""
+    """A surface as numbers: a record of HEADER, then a column for each of COLUMN, boxes, and a wheel's angles."""
     points = np.concatenate([surface.corners, surface.centres])
-    header = np.zeros(HEADER)
-    header[0] = surface.edge_on
-    header[1:4], header[4:7] = points.min(axis=0), points.max(axis=0)
+    numbers = np.zeros(numbers_in(HEADER))
+    header = record(numbers, HEADER)
+    header.edge_on, header.ntri = surface.edge_on, surface.ntri
+    header.lowest, header.highest = points.min(axis=0), points.max(axis=0)
+    header.gyration = np.sqrt((surface.centres**2).sum(axis=1).mean())
+    angles = np.empty(0)
     if surface.wheel is not None:
-        header[7:10], header[10:13], header[13] = surface.wheel.axis, surface.wheel.centre, surface.wheel.radius
-    header[14] = surface.ntri
-    header[15] = np.sqrt((surface.centres**2).sum(axis=1).mean())
-    angles = _rim_angles(surface, header) if surface.wheel is not None else np.empty(0)
+        header.wheel_axis, header.wheel_centre = surface.wheel.axis, surface.wheel.centre
+        header.wheel_radius = surface.wheel.radius
+        header.rim_start, angles = _rim_angles(surface, header)
     columns = *surface.centres.T, *surface.normals.T, surface.areas
-    return np.concatenate([header, *columns, _boxes(surface).ravel(), angles])
+    return np.concatenate([numbers, *columns, _boxes(surface).ravel(), angles])
 
 
-def _rim_angles(surface: Surface, header: Array) -> Array:
-    """Each triangle's angle about the wheel's axis [rad], (ntri,); the header gets the direction where they start."""
-    axis, centre = header[7:10], header[10:13]
+def _rim_angles(surface: Surface, header: Any) -> tuple[Array, Array]:
+    """The direction at which angles about the wheel's axis start, (3,), and each triangle's [rad], (ntri,)."""
+    axis = header.wheel_axis
     start = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
-    header[16:19] = start = start / np.linalg.norm(start)
-    arm = surface.centres - centre
+    start = start / np.linalg.norm(start)
+    arm = surface.centres - header.wheel_centre
     angles: Array = np.arctan2(arm @ np.cross(axis, start), arm @ start)
-    return np.where(np.abs(surface.normals @ axis) <= RIM, angles, NO_RIM)
+    return start, np.where(np.abs(surface.normals @ axis) <= RIM, angles, NO_RIM)
 
 
 def _boxes(surface: Surface) -> Array:
-    """Boxes of the centroids of each BLOCK of triangles, (nblock, BOX)."""
+    """Boxes of the centroids of each BLOCK of triangles, numbers of BOX, (nblock, 6)."""
     blocks = [surface.centres[start : start + BLOCK] for start in range(0, surface.ntri, BLOCK)]
     low, high = (np.array([end(block, axis=0) for block in blocks]) for end in (np.min, np.max))
     return np.hstack([low + high, high - low]) / 2
 
 
-def size_of(header: Array) -> int:
-    """Numbers of the packed surface that starts with a header."""
-    n = int(header[14])
-    return HEADER + COLUMNS * n + BOX * ((n + BLOCK - 1) // BLOCK) + (n if header[13] != 0.0 else 0)
+HEADER_NUMBERS: Final = numbers_in(HEADER)
+BOX_NUMBERS: Final = numbers_in(BOX)
+COLUMNS: Final = len(COLUMN)
 
 
-def read_columns(body: Array) -> tuple[Array, ...]:
-    """The columns of a packed surface: centre (3), normal (3), area; views, each (ntri,)."""
-    n = int(body[14])
-    return tuple(body[HEADER + k * n : HEADER + (k + 1) * n] for k in range(COLUMNS))
+@exact_kernel
+def packed_size(header: Any) -> Any:
+    """The number of numbers of the packed surface that starts with a header."""
+    n = int(header.ntri)
+    boxes = (n + BLOCK - 1) // BLOCK
+    return HEADER_NUMBERS + COLUMNS * n + BOX_NUMBERS * boxes + (n if header.wheel_radius != 0.0 else 0)
+
+
+def read_columns(packed: Array) -> tuple[Array, ...]:
+    """The columns of a packed surface, in the order of COLUMN; views, each of shape (ntri,)."""
+    n, start = int(record(packed, HEADER).ntri), HEADER_NUMBERS
+    return tuple(packed[start + k * n : start + (k + 1) * n] for k in COLUMN)
+
+
+def extent(packed: Array) -> float:
+    """The largest extent of a packed surface along an axis of its frame [m]."""
+    header = record(packed, HEADER)
+    return float((header.highest - header.lowest).max())

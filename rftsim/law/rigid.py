@@ -39,7 +39,7 @@ def surface_force(
     velocity: ArrayLike = (0.0, 0.0, 0.0),
     angular_velocity: ArrayLike = (0.0, 0.0, 0.0),
     plane: ArrayLike = (0.0, 1.0, 0.0),
-    free_surface: FreeSurface | None = None,
+    terrain: FreeSurface | None = None,
 ) -> SurfaceForce:
     """Force of sand on a surface that moves as a rigid body.
 
@@ -52,12 +52,12 @@ def surface_force(
         velocity: Of the body's origin [m/s].
         angular_velocity: World frame [rad/s].
         plane: Normal of the plane of motion of the 2D laws; horizontal.
-        free_surface: By default level at height zero.
+        terrain: By default level at height zero.
     """
-    bed = layout.pack_sand(sand, get_law(law), free_surface or FreeSurface(), plane)
+    bed = layout.pack_bed(sand, get_law(law), terrain or FreeSurface(), plane)
     rotation, velocity, omega = (np.array(x, dtype=float) for x in (rotation, velocity, angular_velocity))
     pose = np.array(position, dtype=float), rotation.ravel()
-    stress, depth = evaluate.tractions(bed, layout.pack_surface(surface), *pose, velocity, omega)
+    stress, depth = evaluate.triangle_stresses(bed, layout.pack_surface(surface), *pose, velocity, omega)
     force = stress.T @ surface.areas
     moment = np.cross(surface.centres, stress).T @ surface.areas
     force, moment, stress = rotation @ force, rotation @ moment, stress @ rotation.T

@@ -1,63 +1,99 @@
 """The triangles of a body that the sand can act on, next to one another, so that no other is evaluated.
 
 A law gives nothing above the sand and nothing behind the leading edge. Of a wheel in sand that leaves one triangle in
-eight; finding and copying them costs about a quarter of an evaluation each.
+eight; finding and copying them costs about a quarter of an evaluation each. Which ones follows from the leading-edge
+rule and the depth, see `leading` and `free_surface`.
 """
 
 from typing import Any, Final
 
-from numba import carray, njit, types
+from numba import carray, types
 
-from rftsim.law.layout import BLOCK, BOX, COLUMNS, HEADER
+from rftsim.law import body as bodies
+from rftsim.law.frame import point_velocity
+from rftsim.law.free_surface import depth, rising
+from rftsim.law.laws import Response
+from rftsim.law.layout import BLOCK, COLUMN, COLUMNS
+from rftsim.law.leading import may_lead
+from rftsim.law.vectors import larger, smaller
+from rftsim.machine.compiling import inline, inline_loop
 from rftsim.machine.memory import on_stack, peek, poke
-from rftsim.solver.linear_algebra import FASTMATH
 
 LOOK: Final = 4 * BLOCK
 """Triangles that are looked at together, at most."""
-ROOM: Final = 392
+CAPACITY: Final = 392
 """Triangles that are evaluated together at most; no power of two, lest the columns share the cache's sets."""
 LANES: Final = 8
 """They are filled up to a multiple of this with ones without area: what is left over of a vectorised loop is slow."""
 
-_columns, _scores = on_stack(COLUMNS * ROOM, types.float64), on_stack(LOOK, types.float64)
+_columns, _scores = on_stack(COLUMNS * CAPACITY, types.float64), on_stack(LOOK, types.float64)
 _indices = on_stack(LOOK, types.int64)
 
 
-@njit(forceinline=True)
-def block_is_clear(body, block, frame, margin):
-    """Whether a block of triangles lies more than a margin above the undisturbed sand."""
-    start, r = HEADER + COLUMNS * int(body[14]) + BOX * block, frame.rise
-    middle = r[0] * peek(body, start) + r[1] * peek(body, start + 1) + r[2] * peek(body, start + 2)
-    below = abs(r[0]) * peek(body, start + 3) + abs(r[1]) * peek(body, start + 4) + abs(r[2]) * peek(body, start + 5)
-    return middle - below >= frame.height + margin
-
-
-@njit(forceinline=True)
+@inline
 def next_run(body, start, frame, margin):
     """The next triangles from start on whose blocks are not clear, at most LOOK: first, and the one behind the last.
 
     Both are the number of triangles where none are left.
     """
-    count = int(body[14])
     first = start
-    while first < count and block_is_clear(body, first // BLOCK, frame, margin):
+    while first < body.count and bodies.block_is_clear(body, first // BLOCK, frame, margin):
         first += BLOCK
     last = first
-    while last < count and last < first + LOOK and not block_is_clear(body, last // BLOCK, frame, margin):
+    while last < body.count and last < first + LOOK and not bodies.block_is_clear(body, last // BLOCK, frame, margin):
         last += BLOCK
-    return min(first, count), min(last, count)
+    return min(first, body.count), min(last, body.count)
 
 
-@njit(forceinline=True)
-def columns_on_stack():
-    """Space for the chosen triangles, on the stack: COLUMNS of ROOM, as a packed surface has them."""
-    return carray(_columns(), (COLUMNS * ROOM,))
+@inline
+def chosen_on_stack():
+    """Space for the chosen triangles, on the stack: columns of CAPACITY, in the order of a packed surface."""
+    return carray(_columns(), (COLUMNS * CAPACITY,))
 
 
-def choosing(score: Any) -> Any:
-    """The function that chooses, for a score (of centre, normal, frame and two more) that is negative where not."""
+@inline
+def centre(chosen, i):
+    """The centre of the i-th chosen triangle [m], (3,)."""
+    return chosen[i + COLUMN.x * CAPACITY], chosen[i + COLUMN.y * CAPACITY], chosen[i + COLUMN.z * CAPACITY]
 
-    @njit(fastmath=FASTMATH, error_model="numpy", forceinline=True)
+
+@inline
+def normal(chosen, i):
+    """The outward normal of the i-th chosen triangle, (3,)."""
+    return chosen[i + COLUMN.nx * CAPACITY], chosen[i + COLUMN.ny * CAPACITY], chosen[i + COLUMN.nz * CAPACITY]
+
+
+@inline
+def area(chosen, i):
+    """The area of the i-th chosen triangle [m^2]."""
+    return chosen[i + COLUMN.area * CAPACITY]
+
+
+@inline
+def filled_up(chosen, n):
+    """How many are chosen after ones without area made their number a multiple of LANES."""
+    while n % LANES != 0:
+        for column in range(COLUMN.area):
+            poke(chosen, n + column * CAPACITY, peek(chosen, column * CAPACITY))
+        poke(chosen, n + COLUMN.area * CAPACITY, 0.0)
+        n += 1
+    return n
+
+
+def choosing(response: Response, ahead: bool) -> Any:
+    """Make the function that chooses what leads in the sand under a response; ahead: or in that after a time h."""
+    normal_speed = response.normal_speed
+
+    @inline
+    def score(x, y, z, n, frame, reach2, h):
+        v = point_velocity(frame, x, y, z)
+        deep = depth(x, y, z, frame)
+        if ahead:
+            deep = larger(deep, deep - h * rising(v, frame))
+        speed2 = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
+        return smaller(deep, may_lead(normal_speed(n, v, frame), speed2, reach2))
+
+    @inline_loop
     def choose(body, start, frame, margin, reach2, h, chosen, n):
         """Copy what counts of the next run of triangles, see `next_run`, behind the first n.
 
@@ -65,32 +101,18 @@ def choosing(score: Any) -> Any:
             How many are chosen then, and behind which triangle to go on.
         """
         first, last = next_run(body, start, frame, margin)
-        size = int(body[14])
-        at = HEADER + first
         scores, indices = carray(_scores(), (LOOK,)), carray(_indices(), (LOOK,))
         for i in range(last - first):
-            x, y, z = peek(body, at + i), peek(body, at + i + size), peek(body, at + i + 2 * size)
-            nx, ny, nz = peek(body, at + i + 3 * size), peek(body, at + i + 4 * size), peek(body, at + i + 5 * size)
-            poke(scores, i, score(x, y, z, nx, ny, nz, frame, reach2, h))
+            x, y, z = bodies.centre(body, first + i)
+            poke(scores, i, score(x, y, z, bodies.normal(body, first + i), frame, reach2, h))
         found = 0
         for i in range(last - first):
             poke(indices, found, i)
             found += 0 if peek(scores, i) < 0.0 else 1  # what is no number counts, and stays none
         for i in range(found):
-            k, to = at + peek(indices, i), n + i
+            k, to = first + peek(indices, i), n + i
             for column in range(COLUMNS):
-                poke(chosen, to + column * ROOM, peek(body, k + column * size))
+                poke(chosen, to + column * CAPACITY, bodies.at(body, column, k))
         return n + found, last
 
     return choose
-
-
-@njit(forceinline=True)
-def filled_up(chosen, n):
-    """Their number after ones without area made it a multiple of LANES."""
-    while n % LANES != 0:
-        for column in range(COLUMNS - 1):
-            poke(chosen, n + column * ROOM, peek(chosen, column * ROOM))
-        poke(chosen, n + (COLUMNS - 1) * ROOM, 0.0)
-        n += 1
-    return n

@@ -14,15 +14,13 @@ from numba import njit
 from numba import types as numba_types
 
 _LOG: Final = logging.getLogger(__name__)
-_MODULES: Final = {
-    "law": (
-        "rftsim.law.exports",
-        "rftsim.law.exports_ahead",
-        "rftsim.solver.native_solver",
-        "rftsim.solver.native_step",
-    ),
+_PARTS: Final = {
+    "law": ("rftsim.law.exports", "rftsim.solver.newton", "rftsim.solver.time_step"),
     "engine": ("rftsim.engine.callbacks",),
 }
+"""The modules whose functions a part exports."""
+_GIVING: Final = ("machine.link", "law.layout", "engine.layout")
+"""The modules that know what the machine code is keyed by."""
 _C: Final = {numba_types.void: "void", numba_types.intp: "i64", numba_types.intc: "i32", numba_types.float64: "double"}
 _OUTSIDE: Final = re.compile(r"rftsim_\w+|mjd?_\w+|PyMem_RawMalloc|PyMem_RawCalloc|PyMem_RawFree|atan2|sqrt|llvm\..*")
 """What an object may need from elsewhere."""
@@ -35,14 +33,14 @@ _UNCOUNTED: Final = "define void @NRT_MemInfo_call_dtor(ptr %memory) { unreachab
 
 def build(part: str, cpu: str | None = None) -> bytes:
     """The object file of a part, for this processor, or for one that numba was told of."""
-    for module in _MODULES[part]:
+    for module in _PARTS[part]:
         importlib.import_module(module)
-    from rftsim.machine.exports import ENTRIES
+    from rftsim.machine.exports import EXPORTED
 
-    for name in ENTRIES:  # numba links what it compiles, though none of it runs before it is all here
+    for name in EXPORTED:  # numba links what it compiles, though none of it runs before it is all here
         if llvm.address_of_symbol(name) is None:
-            llvm.add_symbol(name, id(ENTRIES))
-    own = {name: entry for name, entry in ENTRIES.items() if entry[0].__module__ in _MODULES[part]}
+            llvm.add_symbol(name, id(EXPORTED))
+    own = {name: entry for name, entry in EXPORTED.items() if entry[0].__module__ in _PARTS[part]}
     whole = llvm.parse_assembly(_UNCOUNTED)
     for name, (function, signature) in own.items():
         _LOG.info("compiling %s", name)
@@ -114,19 +112,24 @@ def _builder(machine: llvm.TargetMachine) -> llvm.PassBuilder:
 
 
 def ship() -> None:
-    """Write the object files that ship."""
+    """Write the object files that ship, and the list of their hashes.
+
+    Raises:
+        OSError: One cannot be written.
+    """
     logging.basicConfig(level=logging.INFO, format="%(message)s")
     package = types.ModuleType("rftsim")  # instead of the package, which would compile for this machine first
     package.__path__ = [str(Path(__file__).parent.parent)]
     sys.modules["rftsim"] = package
-    link, layout = (importlib.import_module(f"rftsim.{name}") for name in ("machine.link", "engine.layout"))
+    link, laws, structs = (importlib.import_module(f"rftsim.{name}") for name in _GIVING)
     numba.config.CPU_NAME, numba.config.CPU_FEATURES = link.SHIPPED_FOR, ""
-    layout.publish()
-    for part, given in (("law", ""), ("engine", layout.GIVEN)):
+    structs.publish()
+    for part, given in (("law", laws.GIVEN), ("engine", structs.GIVEN)):
         path = link.shipped_file(part)
         code = build(part, link.SHIPPED_FOR)
         if not link.write(path, link.key_of(given), code):
             raise OSError(f"cannot write {path}")
+    link.SUMS.write_text("".join(f"{link.sum_of(path)}  {path.name}\n" for path in sorted(link.SHIPPED.glob("*.xz"))))
 
 
 if __name__ == "__main__":

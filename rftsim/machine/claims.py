@@ -1,15 +1,19 @@
-"""The registry's entries for compiled code: found, claimed and given back, from any thread."""
+"""The registry's places for compiled code: found, claimed and given back, from any thread."""
 
 from typing import Any
 
 from llvmlite import ir
-from numba import njit, types
+from numba import types
 from numba.extending import intrinsic
 
-from rftsim.machine.memory import allocate, int64s, named_address, release
-from rftsim.machine.registry import SIZE, SYMBOL, WORDS
+from rftsim.machine.compiling import exact
+from rftsim.machine.memory import allocate, named_address, release
+from rftsim.machine.records import record_at
+from rftsim.machine.registry import PLACE, PLACES, SYMBOL
 
 _table_address = named_address(SYMBOL)
+_place_at = record_at(PLACE)
+_BYTES = PLACE.itemsize
 
 
 @intrinsic
@@ -25,57 +29,69 @@ def _claim(typing_context: Any, address: Any, owner: Any) -> Any:
     return types.boolean(types.intp, types.int64), generate
 
 
-@njit
-def _entry(number):
-    return int64s(_table_address() + 8 * WORDS * number, WORDS)
+@exact
+def _is_own(number, owner, which):
+    """Whether a place is that of an owner's memory."""
+    place = _place_at(_table_address() + _BYTES * number)
+    return place.owner == owner and place.which == which
 
 
-@njit
+@exact
 def find(hint, owner, which):
-    """The number of an owner's entry, or -1; `hint` is looked at first."""
-    if 0 <= hint < SIZE and _entry(hint)[0] == owner and _entry(hint)[1] == which:
+    """The number of an owner's place, or -1; `hint` is looked at first."""
+    if 0 <= hint < PLACES and _is_own(hint, owner, which):
         return hint
-    start = (owner >> 4) % SIZE
-    for k in range(SIZE):
-        number = (start + k) % SIZE
-        entry = _entry(number)
-        if entry[0] == owner and entry[1] == which:
+    start = (owner >> 4) % PLACES
+    for k in range(PLACES):
+        number = (start + k) % PLACES
+        if _is_own(number, owner, which):
             return number
     return -1
 
 
-@njit
+@exact
+def _take(owner):
+    """The number of a free place that an owner has claimed now, or -1 where there is none left."""
+    start = (owner >> 4) % PLACES
+    for k in range(PLACES):
+        candidate = (start + k) % PLACES
+        at = _table_address() + _BYTES * candidate
+        if _place_at(at).owner == 0 and _claim(at, owner):  # the owner is a place's first word
+            return candidate
+    return -1
+
+
+@exact
 def make(hint, owner, which, words):
-    """Give an owner memory, what it has where the size is right; its number, or -1 where there is none left."""
+    """Allocate `words` zeroed words for an owner, or keep its memory if the size matches.
+
+    Returns:
+        The number of the owner's place, or -1 where there is no place or no memory left.
+    """
     number = find(hint, owner, which)
     if number < 0:
-        start = (owner >> 4) % SIZE
-        for k in range(SIZE):
-            candidate = (start + k) % SIZE
-            if _entry(candidate)[0] == 0 and _claim(_table_address() + 8 * WORDS * candidate, owner):
-                number = candidate
-                break
+        number = _take(owner)
         if number < 0:
             return -1
-        _entry(number)[1] = which
-    entry = _entry(number)
-    if entry[2] == 0 or entry[3] != words:
-        release(entry[2])
-        entry[2], entry[3] = allocate(words, 8), words
-    return number if entry[2] != 0 else -1
+        _place_at(_table_address() + _BYTES * number).which = which
+    place = _place_at(_table_address() + _BYTES * number)
+    if place.address == 0 or place.words != words:
+        release(place.address)
+        place.address, place.words = allocate(words, 8), words
+    return number if place.address != 0 else -1
 
 
-@njit
+@exact
 def address(number):
-    """Where the memory of an entry is."""
-    return _entry(number)[2]
+    """The address of the memory of a place."""
+    return _place_at(_table_address() + _BYTES * number).address
 
 
-@njit
+@exact
 def drop(number):
-    """Release an entry and its memory."""
-    entry = _entry(number)
-    memory = entry[2]
-    entry[1] = entry[2] = entry[3] = 0
-    entry[0] = 0  # last: from here on it may be claimed
+    """Release a place and its memory."""
+    place = _place_at(_table_address() + _BYTES * number)
+    memory = place.address
+    place.which = place.address = place.words = 0
+    place.owner = 0  # last: from here on it may be claimed
     release(memory)

@@ -23,6 +23,8 @@ from rftsim.files import replacing
 from rftsim.machine.sources import PACKAGE, SOURCE
 
 SHIPPED: Final = Path(__file__).parent / "shipped"
+SUMS: Final = SHIPPED / "SHA256SUMS"
+"""The SHA-256 of each object file that ships, as `sha256sum` writes them; one that is not as listed is not linked."""
 SHIPPED_FOR: Final = "x86-64-v3"
 _LOG: Final = logging.getLogger(__name__)
 _FEATURES: Final = ("avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe")
@@ -69,9 +71,9 @@ def _engine() -> llvm.ExecutionEngine:
 
 
 def object_file(part: str, given: str) -> bytes:
-    """A part's object file."""
+    """The object file of a part: what ships, what was compiled before, or what is compiled now."""
     key = key_of(given)
-    if takes_shipped() and (code := _read(shipped_file(part), key)) is not None:
+    if takes_shipped() and is_as_listed(shipped_file(part)) and (code := _read(shipped_file(part), key)) is not None:
         return code
     machine = f"{llvm.get_host_cpu_name()} {llvm.get_host_cpu_features().flatten()} {llvmlite.__version__}"
     key = hashlib.sha256(key + machine.encode()).digest()
@@ -97,6 +99,19 @@ def key_of(given: str) -> bytes:
 def shipped_file(part: str) -> Path:
     """Where a part lies that ships with the package."""
     return SHIPPED / f"{part}-{SHIPPED_FOR}.o.xz"
+
+
+def sum_of(path: Path) -> str:
+    """The SHA-256 of a file, in hexadecimal digits."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def is_as_listed(path: Path) -> bool:
+    """Whether a file that ships is byte for byte the one that the list of hashes names; False where it is missing."""
+    try:
+        return f"{sum_of(path)}  {path.name}" in SUMS.read_text().splitlines()
+    except OSError:
+        return False
 
 
 def takes_shipped() -> bool:

@@ -74,7 +74,7 @@ def named_address(name: str) -> Any:
 
 
 @intrinsic(prefer_literal=True)
-def room(typing_context: Any, size: Any) -> Any:
+def stack_doubles(typing_context: Any, size: Any) -> Any:
     """The address of so many float64, a constant, that live as long as the calling function runs."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -92,7 +92,7 @@ def _reserved(builder: Any, element: Any, size: int) -> Any:
 
 
 def on_stack(size: int, element: Any) -> Any:
-    """What gives compiled code a pointer to `size` numbers on its function's stack."""
+    """Make what gives compiled code a pointer to `size` numbers on its function's stack."""
 
     @intrinsic
     def reserve(typing_context: Any) -> Any:
@@ -137,7 +137,7 @@ release = types.ExternalFunction("PyMem_RawFree", types.void(types.intp))
 
 
 def tuples(size: int, element: Any) -> Any:
-    """What reads `size` numbers at an address into a tuple; numba's own way there keeps a tuple in memory."""
+    """Make what reads `size` numbers at an address into a tuple; numba's own way there keeps a tuple in memory."""
 
     @intrinsic
     def read(typing_context: Any, address: Any) -> Any:

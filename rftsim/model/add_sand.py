@@ -111,7 +111,7 @@ def add_sand(
     _check_choices(force, geoms, max_edge, tolerance)
     bed_sand, bed_law = make_sand(sand), get_law(law)
     terrain = terrain if isinstance(terrain, FreeSurface) else FreeSurface(height=terrain)
-    numbers = layout.pack_sand(bed_sand, bed_law, terrain, plane)
+    numbers = layout.pack_bed(bed_sand, bed_law, terrain, plane)
     check_bed(spec, name)
     draft = make_draft(spec)  # what is checked; the spec itself stays as it is until all is well
     _check_model(draft.model, bed_sand)
@@ -120,7 +120,7 @@ def add_sand(
         collision_only=geoms == "collision",
         max_edge=max_edge,
         allow_open=allow_open,
-        plane=numbers[7:10] if bed_law.planar else None,
+        plane=layout.record(numbers, layout.BED).plane if bed_law.planar else None,
         terrain=terrain if tolerance is not None and bodies is None else None,
     )
     felt = felt_bodies(draft.model, choice)

@@ -1,11 +1,11 @@
-"""What the sand does to a model's bodies, read from the model and its data."""
+"""The sand's action on a model's bodies, read from the model and its data."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
 
-from rftsim.engine.block import BODY_MARKER, SAND_MARKER, read_counters, read_wrenches
+from rftsim.engine.block import BODY_MARKER, SAND_MARKER, read_block
 from rftsim.errors import SceneError
 from rftsim.law import evaluate, layout
 from rftsim.surface.triangles import Array
@@ -45,10 +45,22 @@ class Instance(NamedTuple):
     id: int
     """Plugin instance."""
     name: str
-    sand: Array
-    """Packed sand, `layout.SAND_FIELDS`; a view of the model's numeric_data, so a write changes the sand."""
+    start: int
+    """Where its sand starts in the model's numeric_data."""
+    packed: Array
+    """Its sand as numbers, see `bed`; a view of the model's numeric_data."""
     bodies: dict[int, Array]
     """Packed surface of each body that feels it, by body id; a view."""
+
+    @property
+    def bed(self) -> Any:
+        """The sand's parameters by name, `layout.BED`: xi_n, mu_surf, rho_c, ...; writing one changes the sand."""
+        return layout.record(self.packed, layout.BED)
+
+    def beds_in(self, numeric_data: Array) -> Any:
+        """The same of many simulations, from their numeric_data, (n, nnumericdata): an array of `layout.BED`, (n,)."""
+        numbers = numeric_data[:, self.start : self.start + self.packed.size]
+        return numbers.view(layout.BED)[:, 0]
 
 
 def instances(model: mujoco.MjModel) -> list[Instance]:
@@ -64,7 +76,8 @@ def instances(model: mujoco.MjModel) -> list[Instance]:
         name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_PLUGIN, instance)
         numeric = _marked(by_name, SAND_MARKER, name)
         assert numeric is not None, "MuJoCo would not have made data for a bed without its sand"
-        beds.append(Instance(instance, name, _numeric(model, numeric), bodies))
+        start = int(model.numeric_adr[numeric])
+        beds.append(Instance(instance, name, start, _numeric(model, numeric), bodies))
     return beds
 
 
@@ -85,8 +98,8 @@ def _numeric(model: mujoco.MjModel, i: int) -> Array:
 def _surface(model: mujoco.MjModel, i: int) -> Array:
     """A packed surface, which goes on behind its first numeric."""
     start = int(model.numeric_adr[i])
-    header = model.numeric_data[start : start + layout.HEADER]
-    view: Array = model.numeric_data[start : start + layout.size_of(header)]
+    header = layout.record(model.numeric_data[start:], layout.HEADER)
+    view: Array = model.numeric_data[start : start + layout.packed_size(header)]
     return view
 
 
@@ -98,8 +111,8 @@ def wrenches(model: mujoco.MjModel, data: mujoco.MjData) -> Wrenches:
     """
     force, moment = np.zeros((model.nbody, 3)), np.zeros((model.nbody, 3))
     for bed in instances(model):
-        for body, wrench in read_wrenches(int(data.plugin_data[bed.id]), data._address, bed.id):
-            force[body], moment[body] = wrench[:3], wrench[3:]
+        block = read_block(int(data.plugin_data[bed.id]), data._address, bed.id)
+        force[block.bodies], moment[block.bodies] = block.wrenches[:, :3], block.wrenches[:, 3:]
     velocity, omega = body_velocities(model, data)
     return Wrenches(force, moment, np.einsum("ij,ij->i", force, velocity) + np.einsum("ij,ij->i", moment, omega))
 
@@ -119,8 +132,8 @@ def tractions(model: mujoco.MjModel, data: mujoco.MjData, body: "int | str") -> 
     surface = bed.bodies[index]
     velocity, omega = body_velocities(model, data)
     rotation = data.xmat[index].reshape(3, 3)
-    stress, depth = evaluate.tractions(
-        bed.sand, surface, data.xpos[index], data.xmat[index], velocity[index], omega[index]
+    stress, depth = evaluate.triangle_stresses(
+        bed.packed, surface, data.xpos[index], data.xmat[index], velocity[index], omega[index]
     )
     *columns, area = layout.read_columns(surface)
     centre, normal = np.array(columns[:3]).T, np.array(columns[3:]).T
@@ -142,7 +155,7 @@ def body_velocities(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[Array, 
 
 
 class Work(NamedTuple):
-    """What the implicit force has cost since the data was made or reset."""
+    """The cost of the implicit force since the data was made or reset."""
 
     steps: int
     evaluations: int
@@ -153,10 +166,14 @@ class Work(NamedTuple):
     """Equations whose solution stayed outside the tolerance; the best found was taken."""
 
 
+_TOTALS = ("steps", "all_evaluations", "all_derivatives", "all_unsolved")
+
+
 def work(model: mujoco.MjModel, data: mujoco.MjData) -> Work:
     """The cost of the sand so far, summed over the beds."""
     totals = np.zeros(4, dtype=int)
     for bed in instances(model):
-        totals += np.array(read_counters(int(data.plugin_data[bed.id]), data._address, bed.id), dtype=int)
+        counters = read_block(int(data.plugin_data[bed.id]), data._address, bed.id).counters
+        totals += np.array([counters[name] for name in _TOTALS], dtype=int)
     steps, *costs = totals.tolist()
     return Work(steps, *costs)

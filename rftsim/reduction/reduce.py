@@ -93,7 +93,7 @@ def middle(surface: Surface) -> Array:
     return 0.5 * (low + high)  # type: ignore[no-any-return]
 
 
-def draw(surface: Surface, sand: Array, reach: Reach, depths: tuple[float, ...], seed: int) -> Samples:
+def draw(surface: Surface, bed: Array, reach: Reach, depths: tuple[float, ...], seed: int) -> Samples:
     """Samples of each orientation of a body at each depth, with MOTIONS motions each.
 
     Near the translations along the three axes and the rotations about them, both ways, and others drawn at random, as
@@ -101,18 +101,19 @@ def draw(surface: Surface, sand: Array, reach: Reach, depths: tuple[float, ...],
 
     Args:
         surface: The body's surface.
-        sand: Packed sand.
+        bed: Packed sand.
         reach: Orientations and motions of the body.
         depths: Depths of the lowest corner, over the body's size [-].
         seed: Seed of the motions.
     """
     rng = np.random.default_rng(seed)
-    size, centre, up, g = surface.size, middle(surface), sand[3:6], sand[15]
+    sand = layout.record(bed, layout.BED)
+    size, centre, up, g = surface.size, middle(surface), sand.up, sand.g
     rows: list[tuple[float, Array, Array, Array, Array]] = []
     for rotation, allowed in zip(reach.rotations, reach.motions, strict=True):
         lowest = float((surface.corners @ rotation.T @ up).min())
         for depth in depths:
-            position = (sand[6] - lowest - depth * size) * up
+            position = (sand.offset - lowest - depth * size) * up
             for motion in _motions(allowed, math.sqrt(g * size), rng):
                 omega = motion[3:] / (size / 2)
                 rows.append((depth, position, rotation, motion[:3] - np.cross(omega, rotation @ centre), omega))
@@ -129,10 +130,10 @@ def _motions(allowed: Array, fastest: float, rng: np.random.Generator) -> Iterat
             yield motion / length * fastest * rng.uniform(0.1, 1.0)
 
 
-def wrenches(surface: Surface, sand: Array, samples: Samples) -> Array:
+def scaled_wrenches(surface: Surface, bed: Array, samples: Samples) -> Array:
     """Force, and moment about the body's centre over half its size, at each sample [N], shape (n, 6)."""
     body = layout.pack_surface(surface)
-    found = evaluate.wrenches(sand, body, *samples[1:])
+    found = evaluate.body_wrenches(bed, body, *samples[1:])
     arm = samples.rotation @ middle(surface)
     moment = found[:, 3:] - np.cross(arm, found[:, :3])
     return np.hstack([found[:, :3], moment / (surface.size / 2)])
@@ -156,7 +157,7 @@ def _scales(whole: Array, depth: Array) -> Array:
 
 
 def reduced(
-    surface: Surface, sand: Array, tolerance: float, reach: Callable[[int], Reach] = free_reach
+    surface: Surface, bed: Array, tolerance: float, reach: Callable[[int], Reach] = free_reach
 ) -> tuple[Surface, Economy]:
     """The surface in the fewest facets found that keep the error under a tolerance, itself where none do.
 
@@ -165,24 +166,24 @@ def reduced(
 
     Args:
         surface: The body's surface.
-        sand: Packed sand; its law is the one that is kept.
+        bed: Packed sand; its law is the one that is kept.
         tolerance: Largest error [-].
         reach: Gives orientations and motions of the body, by a seed.
     """
     surface = surface.clustered(BLOCK)
     areas = surface.areas
-    samples, checks = draw(surface, sand, reach(0), DEPTHS, 0), draw(surface, sand, reach(1), HELD_BACK, 1)
-    whole, checked = wrenches(surface, sand, samples), wrenches(surface, sand, checks)
-    points = features(surface, _nearness(samples, sand[3:6]))
+    samples, checks = draw(surface, bed, reach(0), DEPTHS, 0), draw(surface, bed, reach(1), HELD_BACK, 1)
+    whole, checked = scaled_wrenches(surface, bed, samples), scaled_wrenches(surface, bed, checks)
+    points = features(surface, _nearness(samples, layout.record(bed, layout.BED).up))
     labels: Labels = np.zeros(surface.ntri, dtype=np.intp)
     full = -(-surface.ntri // BLOCK)
     blocks, attempt = 0.5 if full > 1 else full, 2
     while blocks < full:
         while (lacking := int(blocks * BLOCK) - (int(labels.max()) + 1)) > 0:
             facets = merged(surface, labels)
-            drawn = draw(surface, sand, reach(attempt), DEPTHS, attempt)
+            drawn = draw(surface, bed, reach(attempt), DEPTHS, attempt)
             some = np.random.default_rng(attempt).permutation(len(drawn.depth))[:STEERING]
-            share = _shares(surface, facets, labels, sand, Samples(*(x[some] for x in drawn)))
+            share = _shares(surface, facets, labels, bed, Samples(*(x[some] for x in drawn)))
             grown = split(labels, np.argsort(-share)[:lacking], points, areas)
             attempt += 1
             if grown.max() == labels.max():
@@ -190,23 +191,23 @@ def reduced(
             labels = grown
         labels = settled(labels, points, areas)
         facets = merged(surface, labels)
-        error = errors(whole, wrenches(facets, sand, samples), samples.depth).max()
+        error = errors(whole, scaled_wrenches(facets, bed, samples), samples.depth).max()
         if error <= tolerance:
-            held_back = errors(checked, wrenches(facets, sand, checks), checks.depth).max()
+            held_back = errors(checked, scaled_wrenches(facets, bed, checks), checks.depth).max()
             if held_back <= 2 * tolerance:
                 return facets.clustered(BLOCK), Economy(surface.ntri, facets.ntri, float(error), float(held_back))
         blocks = max(2 * blocks, 1) if blocks < 2 else int(GROWTH * blocks) + 1
     return surface, Economy(surface.ntri, surface.ntri, 0.0, 0.0)
 
 
-def _shares(surface: Surface, facets: Surface, labels: Labels, sand: Array, samples: Samples) -> Array:
+def _shares(surface: Surface, facets: Surface, labels: Labels, bed: Array, samples: Samples) -> Array:
     """Each facet's part in the error of the wrench, (nfacet,): squares of the errors of its own force, summed."""
     bodies = layout.pack_surface(surface), layout.pack_surface(facets)
-    whole, reduced = (wrenches(body, sand, samples) for body in (surface, facets))
+    whole, reduced = (scaled_wrenches(body, bed, samples) for body in (surface, facets))
     scale = _scales(whole, samples.depth)
     share = np.zeros(facets.ntri)
     for sample in np.argsort(-_larger(whole - reduced) / scale)[:WORST]:
-        fine, coarse = (evaluate.tractions(sand, body, *(x[sample] for x in samples[1:]))[0] for body in bodies)
+        fine, coarse = (evaluate.triangle_stresses(bed, body, *(x[sample] for x in samples[1:]))[0] for body in bodies)
         force = [np.bincount(labels, column) for column in (fine * surface.areas[:, None]).T]
         share += ((force - (coarse * facets.areas[:, None]).T) ** 2).sum(axis=0) / scale[sample] ** 2
     return share

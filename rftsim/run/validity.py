@@ -6,7 +6,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from rftsim.law.layout import SAND_FIELDS
+from rftsim.law.layout import extent
 from rftsim.model.readout import body_velocities, instances, tractions
 
 FROUDE_LIMIT = 0.4
@@ -56,11 +56,11 @@ def validity(model: mujoco.MjModel, data: mujoco.MjData, grain_diameter: float |
     velocity, omega = body_velocities(model, data)
     found = []
     for bed in instances(model):
-        g = float(bed.sand[SAND_FIELDS.index("g")])
-        dynamic = bool(bed.sand[SAND_FIELDS.index("dynamic")])
+        g = float(bed.bed.g)
+        dynamic = bool(bed.bed.dynamic)
         for body, surface in bed.bodies.items():
             triangles = tractions(model, data, body)
-            size = float((surface[4:7] - surface[1:4]).max())
+            size = extent(surface)
             name = model.body(body).name
             if not triangles.active.any():
                 found.append(Validity(name, 0.0, 0.0, 0.0, dynamic))

@@ -1,188 +1,50 @@
 """The equation of one time step, M (v+ - v) = h (tau + J' f(v+) + Q(v+)), as a table that compiled functions share.
 
-The table holds three counts and the addresses of arrays. What works on the equation takes the table's address alone:
-it can so be compiled and called apart, see `native`.
+The table at an address p holds counts and the addresses of arrays. What works on the equation takes p alone: it can so
+be compiled and called apart. Each array is declared below by what gives it from p: its shape, in numbers and in counts
+of bodies in the sand (nbody), degrees of freedom (nv) and rows of constraints (nrow), and what it holds.
 """
 
 from typing import Final, NamedTuple
 
-from numba import njit
+import numpy as np
 
-from rftsim.law.exports_ahead import FRAME
-from rftsim.machine.memory import doubles, int64s, matrix
+from rftsim.law import step_frame
+from rftsim.machine.compiling import exact, inline
+from rftsim.machine.memory import int64s
+from rftsim.machine.table import Table
+from rftsim.solver.state import State, state_size
 
+TABLE_HEAD: Final = np.dtype([(name, "i8") for name in ("nbody", "nv", "nrow", "sand", "work", "old", "new", "before")])
+"""What a table starts with: the counts; then addresses, of the packed sand, of the counters of WORK, and of three
+states: after the last step, after this one, and a copy of the former to forget parts of."""
+WORK: Final = np.dtype([("evaluations", "f8"), ("derivatives", "f8"), ("unsolved", "f8")])
+"""What solutions cost, counted up: evaluations of every body's force, of its derivative, and equations unsolved."""
+NUMBERS: Final = np.dtype(
+    [("timestep", "f8"), ("h", "f8"), ("impulse", "f8"), ("v_c", "f8"), ("knows_derivative", "f8"), ("solved", "f8")]
+)
+"""MuJoCo's time step [s]; that of the equation [s]; size of the impulse h tau; speed below which a triangle's stress
+falls to zero [m/s]; whether `derivative` is known; whether the equation was solved."""
+SCORES: Final = np.dtype([("missing", "f8"), ("scale", "f8"), ("error", "f8")])
+"""Of a tried velocity: size of the missing impulse, size of all impulses, error of the bodies' speeds over what is
+allowed."""
 
-class Entries(NamedTuple):
-    """Where the table holds what."""
-
-    nbody: int
-    """Bodies in the sand."""
-    nv: int
-    """Degrees of freedom."""
-    nrow: int
-    """Rows of constraints."""
-
-    # Of the bodies in the sand.
-    jacobian: int
-    """Twist of each body about its origin, velocity first, world frame, by the generalised velocity, (nbody, 6, nv)."""
-    rotation: int
-    """Body to world, row-major, (nbody, 9)."""
-    frames: int
-    """What fixes the depths, see `native_ahead`, (nbody, FRAME)."""
-    length: int
-    """Length that makes a velocity of an angular one [m], (nbody,)."""
-    surface: int
-    """Address of each packed surface, int64, (nbody,)."""
-    sand: int
-    """Packed sand."""
-
-    # Constraint rows, of which one at an acceleration a gives the force -D (J a - aref), limited by kind.
-    row_jacobian: int
-    """J, (nrow, nv)."""
-    row_drag: int
-    """J M^-1 of the drag, (nrow, nv)."""
-    row_acceleration: int
-    """J M^-1 M_h, which turns (v+ - v) / h into the acceleration that MuJoCo's solver sees, (nrow, nv)."""
-    row_stiffness: int
-    """D, (nrow,)."""
-    row_reference: int
-    """aref, (nrow,)."""
-    row_kind: int
-    """One of KIND, int64, (nrow,)."""
-    row_bound: int
-    """Largest force of a friction row; of a cone its mu, of its tangents their friction, (nrow,)."""
-    row_damping: int
-    """Derivative of -aref by the row's velocity, (nrow,)."""
-    row_spring: int
-    """Derivative of -aref by the row's position, (nrow,)."""
-    row_scratch: int
-    """(4, nrow)."""
-
-    # The equation.
-    mass: int
-    """M_h: the mass matrix with what the integrator takes implicitly, (nv, nv)."""
-    mass_factors: int
-    mass_order: int
-    start: int
-    """v, (nv,)."""
-    force: int
-    """tau, (nv,)."""
-    step: int
-    """h [s], size of the impulse h tau, and the speed v_c [m/s] below which a triangle's stress falls to zero, (3,)."""
-
-    # Its solution.
-    last: int
-    """A velocity near the solution, (nv,)."""
-    foreseen: int
-    """The sand's force foreseen there, (nv,)."""
-    derivative: int
-    """Derivative of each body's wrench by its twist, (nbody, 6, 6)."""
-    completed: int
-    """One that does not overshoot, (nbody, 6, 6)."""
-    points: int
-    """The tried velocities."""
-    end: int
-    """Velocity at the end, (nv,)."""
-    flags: int
-    """Whether the derivative is known; whether the equation was solved."""
-    counts: int
-    """Evaluations, derivatives, unsolved equations; counted up."""
-    matrices: int
-    """Scratch, (2, nv, nv)."""
-    order: int
-    """Scratch, int64, (nv,)."""
-    vectors: int
-    """Scratch, (9, nv)."""
-
-    # The step that the equation is part of, as MuJoCo has it.
-    plain_mass: int
-    """M, (nv, nv)."""
-    drag: int
-    """(M_h - M) / h, (nv, nv)."""
-    velocity: int
-    """qvel, (nv,)."""
-    smooth_force: int
-    """All smooth forces but the sand's, (nv,)."""
-    timestep: int
-    """[s], (1,)."""
-    first_stiffness: int
-    first_reference: int
-    first_frames: int
-    old: int
-    """State after the last step, see `state`."""
-    new: int
-    """State after this one."""
-    before: int
-    """Copy of the old state, to forget parts of."""
-    wrench: int
-    """Mean wrench on each body over the step, (nbody, 6)."""
-    out: int
-    """The sand's generalised force, (nv,)."""
-    step_vectors: int
-    """Scratch, (6, nv)."""
+PROGRESS: Final = np.dtype(
+    [
+        (name, "f8")
+        for name in (
+            *("knows_derivative", "is_stale", "is_fresh", "by_secant", "secants_left", "shortened", "failures"),
+            *("iteration", "loosened", "share"),
+        )
+    ]
+)
+"""Of a solution under way: whether there is a derivative at all, it should be taken anew, and was taken at the present
+point; whether the direction comes from the completed one, and for how many more steps; how often the direction was
+shortened, and failed; iterations; factor on the tolerance; share of the direction that is tried."""
 
 
-AT: Final = Entries(*range(len(Entries._fields)))
-"""Numba would compile what takes an entry anew for each constant; of a tuple's fields it takes the type alone."""
-ENTRIES: Final = len(AT)
-
-
-class Vectors(NamedTuple):
-    """The scratch vectors, by what they are used for; two uses share one where they never meet."""
-
-    change: int
-    solved: int
-    sand: int
-    direction: int
-    missing: int
-    fixed: int
-    mean: int
-    difference: int
-    filtered: int
-
-
-class Rows(NamedTuple):
-    """The scratch vectors of the constraint rows."""
-
-    x: int
-    force: int
-    moved: int
-    tried: int
-
-
-class Kept(NamedTuple):
-    """The scratch vectors of the stepping, which the solver leaves alone."""
-
-    one: int
-    two: int
-    three: int
-    four: int
-    five: int
-    six: int
-
-
-class Points(NamedTuple):
-    """The tried velocities."""
-
-    best: int
-    now: int
-    new: int
-    spare: int
-
-
-class Parts(NamedTuple):
-    """Parts of a tried velocity: itself, and the impulse that it misses, (nv,) each.
-
-    Behind them lie each body's wrench at the present depths and at those after the step, (nbody, 12); then the sizes of
-    the residual and of all impulses, and the error over what is allowed.
-    """
-
-    velocity: int
-    residual: int
-
-
-class Marks(NamedTuple):
-    """Kinds of constraint rows."""
+class Kinds(NamedTuple):
+    """The kinds of constraint rows that the equation tells apart."""
 
     equality: int
     limit: int
@@ -192,189 +54,202 @@ class Marks(NamedTuple):
     tangent: int
 
 
-VECTOR: Final = Vectors(*range(9))
+KIND: Final = Kinds(*range(6))
+
+
+class Points(NamedTuple):
+    """The tried velocities of a solution."""
+
+    best: int
+    now: int
+    new: int
+    spare: int
+
+
 POINT: Final = Points(*range(4))
-PART: Final = Parts(*range(2))
-KIND: Final = Marks(*range(6))
-ROW: Final = Rows(*range(4))
-KEEP: Final = Kept(*range(6))
+_POINTS: Final = len(POINT)
+
+_T: Final = Table(TABLE_HEAD, ("nbody", "nv", "nrow"))
+head = _T.head
+"""Record TABLE_HEAD of the table at p."""
+work = _T.outer(WORK, "work")
+"""Record WORK, that counts for the table at p."""
+numbers = _T.record(NUMBERS)
+"""Record NUMBERS of the table at p."""
+
+# Of the bodies in the sand.
+jacobian, _ = _T.each("nbody", 6, "nv")
+"""Twist of a body about its origin, velocity first, world frame, by the generalised velocity, (6, nv)."""
+rotation, _ = _T.each("nbody", 9)
+"""Body to world, row-major, (9,)."""
+frame, frames = _T.each("nbody", step_frame.STEP_FRAME_NUMBERS)
+"""What fixes a body's depths, numbers of `step_frame.STEP_FRAME`; moved in the parts of a split step."""
+_, first_frames = _T.each("nbody", step_frame.STEP_FRAME_NUMBERS)
+"""The same at the start of the step, of all bodies."""
+length = _T.vector("nbody")
+"""Length that makes a velocity of an angular one [m], (nbody,)."""
+surface = _T.vector("nbody", int64s)
+"""Address of each packed surface, int64, (nbody,)."""
+
+# Constraint rows, of which one at an acceleration a gives the force -D (J a - aref), limited by kind.
+row_jacobian = _T.matrix("nrow", "nv")
+"""J, (nrow, nv)."""
+row_drag = _T.matrix("nrow", "nv")
+"""J M^-1 of the drag, (nrow, nv)."""
+row_acceleration = _T.matrix("nrow", "nv")
+"""J M^-1 M_h, which turns (v+ - v) / h into the acceleration that MuJoCo's solver sees, (nrow, nv)."""
+row_stiffness = _T.vector("nrow")
+"""D, (nrow,); zero where a row's force is given."""
+row_reference = _T.vector("nrow")
+"""aref at the part of the step at hand, (nrow,)."""
+first_stiffness = _T.vector("nrow")
+"""D as MuJoCo has it, (nrow,)."""
+first_reference = _T.vector("nrow")
+"""aref at the start of the step, (nrow,)."""
+row_kind = _T.vector("nrow", int64s)
+"""One of KIND, int64, (nrow,)."""
+row_bound = _T.vector("nrow")
+"""Largest force of a friction row; of a cone its mu, of its tangents their friction, (nrow,)."""
+row_damping = _T.vector("nrow")
+"""Derivative of -aref by the row's velocity [1/s], (nrow,)."""
+row_spring = _T.vector("nrow")
+"""Derivative of -aref by the row's position [1/s^2], (nrow,)."""
+row_error = _T.vector("nrow")
+"""Scratch: J a - aref, (nrow,)."""
+row_force = _T.vector("nrow")
+"""Scratch: the rows' forces, (nrow,)."""
+row_moved = _T.vector("nrow")
+"""Scratch: change of J a along a direction, (nrow,)."""
+row_tried = _T.vector("nrow")
+"""Scratch: J a - aref on the way along a direction, (nrow,)."""
+
+# The equation.
+mass = _T.matrix("nv", "nv")
+"""M_h: the mass matrix with what the integrator takes implicitly, (nv, nv)."""
+mass_factors = _T.matrix("nv", "nv")
+"""LU factors of `mass`, (nv, nv)."""
+mass_order = _T.vector("nv", int64s)
+"""Order of their rows, int64, (nv,)."""
+start = _T.vector("nv")
+"""v, the generalised velocity that the step starts from, (nv,)."""
+force = _T.vector("nv")
+"""tau, the smooth generalised forces but the sand's, (nv,)."""
+
+# Its solution.
+progress = _T.record(PROGRESS)
+"""Record PROGRESS of the solution."""
+last = _T.vector("nv")
+"""A velocity near the solution, (nv,)."""
+foreseen = _T.vector("nv")
+"""The sand's generalised force foreseen there, (nv,)."""
+derivative, derivatives = _T.each("nbody", 6, 6)
+"""Derivative of a body's wrench by its twist, (6, 6)."""
+completed, _ = _T.each("nbody", 6, 6)
+"""One that does not overshoot, (6, 6)."""
+velocity_of = _T.vectors("nv", _POINTS)
+"""Generalised velocity of a point, (nv,)."""
+residual_of = _T.vectors("nv", _POINTS)
+"""The impulse that is missing there, (nv,)."""
+scores = _T.records(SCORES, _POINTS)
+"""Record SCORES of point k."""
+_wrenches_of = _T.vectors(6, _POINTS, "nbody", 2)
+end = _T.vector("nv")
+"""Generalised velocity at the end of the step, (nv,)."""
+linear = _T.matrix("nv", "nv")
+"""Scratch: M - h J' G J, G the sand's derivatives, (nv, nv)."""
+linear_factors = _T.matrix("nv", "nv")
+"""Scratch: LU factors of the same with the rows' stiffness, (nv, nv)."""
+linear_order = _T.vector("nv", int64s)
+"""Scratch: order of their rows, int64, (nv,)."""
+change = _T.vector("nv")
+"""Scratch: a velocity change v+ - v, or an impulse, (nv,)."""
+column = _T.vector("nv")
+"""Scratch: a row of a derivative by the generalised velocity, (nv,)."""
+solved = _T.vector("nv")
+"""Scratch: an impulse over the mass: after `attempt` the error of the velocity, (nv,)."""
+sand_force = _T.vector("nv")
+"""Scratch: the sand's generalised force, (nv,)."""
+direction = _T.vector("nv")
+"""Scratch: the direction of a step of the linearised equation, (nv,)."""
+missing = _T.vector("nv")
+"""Scratch: the impulse missing in the linearised equation, (nv,)."""
+fixed = _T.vector("nv")
+"""Scratch: the share of it that does not come from the rows, (nv,)."""
+search = _T.vector("nv")
+"""Scratch: the direction of a step of the solution, (nv,)."""
+there = _T.vector("nv")
+"""Scratch: a velocity beside a body's rest, (nv,)."""
+others = _T.vector("nv")
+"""Scratch: the sand's generalised force on all bodies but one, (nv,)."""
+mean = _T.vector("nv")
+"""Scratch: the mean velocity of a step, (nv,)."""
+difference = _T.vector("nv")
+"""Scratch: the impulse by which the force at the mean velocity differs, (nv,)."""
+filtered = _T.vector("nv")
+"""Scratch: the velocity change by that impulse, (nv,)."""
+
+# The step that the equation is part of, as MuJoCo has it.
+plain_mass = _T.matrix("nv", "nv")
+"""M, (nv, nv)."""
+drag = _T.matrix("nv", "nv")
+"""(M_h - M) / h, (nv, nv)."""
+velocity = _T.vector("nv")
+"""qvel, (nv,)."""
+smooth_force = _T.vector("nv")
+"""All smooth generalised forces but the sand's, (nv,)."""
+out = _T.vector("nv")
+"""The sand's generalised force over the step, (nv,)."""
+wrench, all_wrenches = _T.each("nbody", 6)
+"""Mean wrench on a body over the step, (6,)."""
+momentum = _T.vector("nv")
+"""Scratch: M v, or M^-1 of a force, (nv,)."""
+grown = _T.vector("nv")
+"""Scratch: the impulse by which the force at the later depths differs, (nv,)."""
+late = _T.vector("nv")
+"""Scratch: the velocity change by that impulse, (nv,)."""
+stopped = _T.vector("nv")
+"""Scratch: the velocity change of the step, (nv,)."""
+unforced = _T.vector("nv")
+"""Scratch: the impulse missing without the sand, (nv,)."""
+nothing = _T.vector("nv")
+"""Scratch: zeros, (nv,)."""
+later_force = _T.vector("nv")
+"""Scratch: the force foreseen for the next step, (nv,)."""
+mean_velocity = _T.vector("nv")
+"""Scratch: the mean velocity over the parts of a split step, (nv,)."""
+moved = _T.vector("nv")
+"""Scratch: the generalised displacement since the start of a split step, (nv,)."""
+kicked = _T.vector("nv")
+"""Scratch: the velocity change since the start of a split step, (nv,)."""
+touched = _T.vector("nv")
+"""Scratch: mean generalised force of the contacts over the parts of a split step, (nv,)."""
+true_end = _T.vector("nv")
+"""Scratch: the true velocity at the end of a split step, (nv,)."""
+
+TABLE: Final = _T.size
+"""Numbers of a table, int64."""
+_lay_out_arrays = _T.layout()
 
 
-@njit
-def point_size(nbody, nv):
-    """Numbers of a tried velocity."""
-    return 2 * nv + 12 * nbody + 3
+@inline
+def wrench_of(p, k, b, later):
+    """A body's wrench at point k: at the present depths (0) or those after the step (1), (6,)."""
+    return _wrenches_of(p, 2 * (head(p).nbody * k + b) + later)
 
 
-@njit
-def _place(table, entry, at, count):
-    table[entry] = at
-    return at + 8 * count
+@inline
+def state(p, address):
+    """The state at an address, of as many bodies and degrees of freedom as the equation has."""
+    return State(address, head(p).nbody, head(p).nv)
 
 
-@njit
-def lay_out(p, at, nbody, nv, nrow, state):
+@exact
+def lay_out(p, at, nbody, nv, nrow):
     """Fill the table at p with addresses from `at` on; the address behind the last.
 
-    What lies elsewhere (AT.sand, AT.counts, AT.old, AT.new) is for the caller to fill.
+    The outer addresses of sand, work, old and new state are for the caller to fill.
     """
-    t = int64s(p, ENTRIES)
-    t[AT.nbody], t[AT.nv], t[AT.nrow] = nbody, nv, nrow
-    at = _place(t, AT.jacobian, at, nbody * 6 * nv)
-    at = _place(t, AT.rotation, at, nbody * 9)
-    at = _place(t, AT.length, at, nbody)
-    at = _place(t, AT.surface, at, nbody)
-    for entry in (AT.frames, AT.first_frames):
-        at = _place(t, entry, at, nbody * FRAME)
-    for entry in (AT.row_jacobian, AT.row_drag, AT.row_acceleration):
-        at = _place(t, entry, at, nrow * nv)
-    for entry in (AT.row_stiffness, AT.row_reference, AT.row_kind, AT.row_bound, AT.row_damping, AT.row_spring):
-        at = _place(t, entry, at, nrow)
-    for entry in (AT.first_stiffness, AT.first_reference):
-        at = _place(t, entry, at, nrow)
-    at = _place(t, AT.row_scratch, at, 4 * nrow)
-    for entry in (AT.mass, AT.mass_factors, AT.plain_mass, AT.drag):
-        at = _place(t, entry, at, nv * nv)
-    at = _place(t, AT.matrices, at, 2 * nv * nv)
-    for entry in (
-        AT.mass_order,
-        AT.order,
-        AT.start,
-        AT.force,
-        AT.last,
-        AT.foreseen,
-        AT.end,
-        AT.velocity,
-        AT.smooth_force,
-        AT.out,
-    ):
-        at = _place(t, entry, at, nv)
-    for entry in (AT.step, AT.flags, AT.timestep):
-        at = _place(t, entry, at, 3)
-    for entry in (AT.derivative, AT.completed):
-        at = _place(t, entry, at, 36 * nbody)
-    at = _place(t, AT.points, at, 4 * point_size(nbody, nv))
-    at = _place(t, AT.vectors, at, 9 * nv)
-    at = _place(t, AT.step_vectors, at, 6 * nv)
-    at = _place(t, AT.wrench, at, 6 * nbody)
-    return _place(t, AT.before, at, state)
-
-
-@njit
-def number(p, entry):
-    """A count, or an address."""
-    return int64s(p, ENTRIES)[entry]
-
-
-@njit
-def of_dofs(p, entry):
-    """An array (nv,)."""
-    return doubles(number(p, entry), number(p, AT.nv))
-
-
-@njit
-def of_rows(p, entry):
-    """An array (nrow,)."""
-    return doubles(number(p, entry), number(p, AT.nrow))
-
-
-@njit
-def rows_by_dofs(p, entry):
-    """An array (nrow, nv)."""
-    return matrix(number(p, entry), number(p, AT.nrow), number(p, AT.nv))
-
-
-@njit
-def square(p, entry):
-    """An array (nv, nv)."""
-    return matrix(number(p, entry), number(p, AT.nv), number(p, AT.nv))
-
-
-@njit
-def scratch(p, k):
-    """A scratch matrix (nv, nv)."""
-    nv = number(p, AT.nv)
-    return matrix(number(p, AT.matrices) + 8 * k * nv * nv, nv, nv)
-
-
-@njit
-def vector(p, k):
-    """A scratch vector (nv,)."""
-    nv = number(p, AT.nv)
-    return doubles(number(p, AT.vectors) + 8 * k * nv, nv)
-
-
-@njit
-def order(p, entry):
-    """The order of the rows that belongs to factors."""
-    return int64s(number(p, entry), number(p, AT.nv))
-
-
-@njit
-def body_jacobian(p, b):
-    """Of one body, (6, nv)."""
-    nv = number(p, AT.nv)
-    return matrix(number(p, AT.jacobian) + 8 * 6 * nv * b, 6, nv)
-
-
-@njit
-def body_frame(p, b):
-    """Of one body, (FRAME,)."""
-    return doubles(number(p, AT.frames) + 8 * FRAME * b, FRAME)
-
-
-@njit
-def body_rotation(p, b):
-    """Of one body, (9,)."""
-    return doubles(number(p, AT.rotation) + 8 * 9 * b, 9)
-
-
-@njit
-def body_length(p, b):
-    """Of one body [m]."""
-    return doubles(number(p, AT.length), number(p, AT.nbody))[b]
-
-
-@njit
-def body_surface(p, b):
-    """The address of one body's packed surface."""
-    return int64s(number(p, AT.surface), number(p, AT.nbody))[b]
-
-
-@njit
-def derivative(p, entry, b):
-    """Of one body's wrench, (6, 6)."""
-    return matrix(number(p, entry) + 8 * 36 * b, 6, 6)
-
-
-@njit
-def point(p, k):
-    """The address of a tried velocity."""
-    return number(p, AT.points) + 8 * k * point_size(number(p, AT.nbody), number(p, AT.nv))
-
-
-@njit
-def point_vector(p, at, part):
-    """The velocity or the residual of a point, (nv,)."""
-    nv = number(p, AT.nv)
-    return doubles(at + 8 * part * nv, nv)
-
-
-@njit
-def point_wrench(p, at, b, later):
-    """A body's wrench of a point: at the present depths (0) or the later ones (1), (6,)."""
-    return doubles(at + 8 * (2 * number(p, AT.nv) + 12 * b + 6 * later), 6)
-
-
-@njit
-def point_scores(p, at):
-    """Size of the residual, size of the impulses, and error of a point, (3,)."""
-    nv, nbody = number(p, AT.nv), number(p, AT.nbody)
-    return doubles(at + 8 * (2 * nv + 12 * nbody), 3)
-
-
-@njit
-def step_vector(p, k):
-    """A scratch vector of the stepping, (nv,)."""
-    nv = number(p, AT.nv)
-    return doubles(number(p, AT.step_vectors) + 8 * k * nv, nv)
+    counts = head(p)
+    counts.nbody, counts.nv, counts.nrow = nbody, nv, nrow
+    counts.before = _lay_out_arrays(p, at)
+    return counts.before + 8 * state_size(nbody, nv)

@@ -1,32 +1,27 @@
 """Small dense linear algebra for compiled code: loops beat LAPACK's overhead at these sizes and need no library."""
 
-from typing import Final
-
-from numba import njit
-
-FASTMATH: Final = {"reassoc", "contract", "arcp", "nsz"}
-"""Floating-point liberties of all compiled loops: what is no number stays none."""
+from rftsim.machine.compiling import exact, fast
 
 
-@njit
+@exact
 def copy(x, out):
-    """Fill out with x."""
+    """Fill out with the numbers of x."""
     for i in range(out.size):
         out[i] = x[i]
 
 
-@njit(fastmath=FASTMATH)
+@fast
 def dot(x, y):
-    """The product x . y."""
+    """The scalar product of two vectors x and y."""
     out = 0.0
     for i in range(x.size):
         out += x[i] * y[i]
     return out
 
 
-@njit(fastmath=FASTMATH)
+@fast
 def multiply(a, x, out):
-    """Fill out with A x."""
+    """Fill out with the product A x."""
     for i in range(a.shape[0]):
         total = 0.0
         for k in range(a.shape[1]):
@@ -34,9 +29,9 @@ def multiply(a, x, out):
         out[i] = total
 
 
-@njit(fastmath=FASTMATH)
+@fast
 def add_transposed(a, x, share, out):
-    """Add share * A' x to out."""
+    """Add a share of the product A' x to out."""
     for i in range(a.shape[0]):
         y = share * x[i]
         if y != 0.0:
@@ -44,7 +39,17 @@ def add_transposed(a, x, share, out):
                 out[k] += a[i, k] * y
 
 
-@njit(fastmath=FASTMATH)
+@exact
+def add_outer(a, left, right, share):
+    """Add a share of the outer product of two vectors to a matrix."""
+    for i in range(left.size):
+        y = share * left[i]
+        if y != 0.0:
+            for k in range(right.size):
+                a[i, k] += y * right[k]
+
+
+@fast
 def factor(a, order):
     """LU factors of a square matrix, in place, by partial pivoting; `order` is filled with that of its rows."""
     n = a.shape[0]
@@ -70,7 +75,7 @@ def factor(a, order):
                     a[i, j] -= share * a[k, j]
 
 
-@njit(fastmath=FASTMATH)
+@fast
 def substitute(lu, order, b, out):
     """Fill out with the solution of A x = b from the factors of A; b and out differ."""
     n = lu.shape[0]
@@ -86,10 +91,16 @@ def substitute(lu, order, b, out):
         out[i] = total / lu[i, i]
 
 
-@njit
+@exact
+def copy_matrix(a, out):
+    """Fill the matrix out with the numbers of A."""
+    for i in range(a.shape[0]):
+        for k in range(a.shape[1]):
+            out[i, k] = a[i, k]
+
+
+@exact
 def factor_of(a, lu, order):
     """Fill lu and order with the factors of A, which stays."""
-    for i in range(a.shape[0]):
-        for k in range(a.shape[0]):
-            lu[i, k] = a[i, k]
+    copy_matrix(a, lu)
     factor(lu, order)

@@ -131,7 +131,7 @@ def _loads(solid: Solid, sand: Sand, motion: Motion, law: str) -> tuple[Array, A
     c, s = np.cos(motion.phase), np.sin(motion.phase)
     rotation = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
     omega, place = np.array([0.0, motion.rate, 0.0]), np.array([0.0, 0.0, motion.height])
-    bed = layout.pack_sand(sand, get_law(law), FreeSurface(), (0.0, 1.0, 0.0))
-    stress, _ = evaluate.tractions(bed, solid.numbers, place, rotation.ravel(), motion.velocity, omega)
+    bed = layout.pack_bed(sand, get_law(law), FreeSurface(), (0.0, 1.0, 0.0))
+    stress, _ = evaluate.triangle_stresses(bed, solid.numbers, place, rotation.ravel(), motion.velocity, omega)
     velocity = motion.velocity + np.cross(omega, solid.surface.centres @ rotation.T)
     return stress @ rotation.T * solid.surface.areas[:, None], velocity

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from rftsim.law import layout
 from rftsim.model.geometry import body_surface, is_colliding
 from rftsim.model.readout import Instance, body_velocities, instances, tractions, wrenches
 from rftsim.surface.triangles import Array
@@ -106,7 +105,7 @@ def describe(model: mujoco.MjModel) -> Portrait:
     skins = [_make_skin(model, start, body) for bed in beds for body in bed.bodies]
     roots = np.unique(model.body_rootid[[skin.body for skin in skins] or slice(1, None)]).tolist()
     weight = float(model.body_mass[model.body_weldid != 0].sum() * np.linalg.norm(model.opt.gravity))
-    return Portrait(model, [(bed, _make_plane(bed.sand)) for bed in beds], skins, roots, weight, *_bounds(model, start))
+    return Portrait(model, [(bed, _make_plane(bed.bed)) for bed in beds], skins, roots, weight, *_bounds(model, start))
 
 
 def _make_skin(model: mujoco.MjModel, start: mujoco.MjData, body: int) -> Skin:
@@ -127,11 +126,10 @@ def _make_skin(model: mujoco.MjModel, start: mujoco.MjData, body: int) -> Skin:
     return Skin(body, geoms, area, drawn.triangles, nearest)
 
 
-def _make_plane(sand: Array) -> Plane:
-    value = dict(zip(layout.SAND_FIELDS, sand.tolist(), strict=False))
-    up = np.array([value["up_x"], value["up_y"], value["up_z"]])
+def _make_plane(bed: Any) -> Plane:
+    up = bed.up.copy()
     along = np.array([up[2], 0.0, -up[0]]) / math.hypot(up[2], up[0])
-    return Plane(along, np.cross(up, along), up, value["offset"])
+    return Plane(along, np.cross(up, along), up, float(bed.offset))
 
 
 def _bounds(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[Array, float]:

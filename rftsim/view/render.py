@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from rftsim.law.layout import extent
 from rftsim.model.readout import instances, tractions
 from rftsim.surface.triangles import Array
 
@@ -46,7 +47,7 @@ def watching(model: mujoco.MjModel, data: mujoco.MjData, body: str) -> mujoco.Mj
     camera = mujoco.MjvCamera()
     camera.lookat[:] = data.xpos[model.body(body).id]
     own = [bed.bodies[model.body(body).id] for bed in instances(model) if model.body(body).id in bed.bodies]
-    size = max((float((surface[4:7] - surface[1:4]).max()) for surface in own), default=model.stat.extent)
+    size = max((extent(surface) for surface in own), default=model.stat.extent)
     camera.distance, camera.azimuth, camera.elevation = 2.2 * size, 115.0, -14.0
     return camera
 

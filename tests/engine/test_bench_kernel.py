@@ -22,13 +22,6 @@ def test_the_time_of_a_triangle(tmp_path):
     assert kernel.load_oracle(tmp_path / "oracle.py") is None
 
 
-def test_single_precision():
-    """The same loop in single precision errs by its rounding, of some 1e-7, and takes less time."""
-    found = kernel.single_precision()
-    assert 1e-8 < found.error < 1e-5
-    assert found.single_nanoseconds < found.double_nanoseconds
-
-
 def test_without_the_oracle():
     """The tests' law is not part of the package, so its time may be missing."""
     (cost,) = kernel.measure((64,), None, lambda _: None)

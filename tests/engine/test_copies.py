@@ -16,7 +16,7 @@ from mujoco import rollout
 from trees import BALL, SAND, sandy, spec_of, trajectory, tree
 
 from rftsim import add_sand, wrenches
-from rftsim.law.layout import SAND_FIELDS
+from rftsim.law.layout import BED
 from rftsim.model.readout import instances
 
 NSTEP = 40
@@ -132,9 +132,9 @@ def test_batch_with_random_sand(force, nthread):
     model = sandy(bodies, terrain=0.1, law="drft3d", force=force)
     starts = starts_of(model)
     batch = batch_of(model, starts, nthread)
-    sand = model.numeric("rftsim-sand:sand").adr[0] + np.arange(instances(model)[0].sand.size)
+    sand = model.numeric("rftsim-sand:sand").adr[0] + np.arange(instances(model)[0].packed.size)
     factors = np.ones((len(starts), sand.size))
-    drawn = [SAND_FIELDS.index(name) for name in ("xi_n", "zeta", "mu_surf", "rho_c")]
+    drawn = [BED.fields[name][1] // 8 for name in ("xi_n", "zeta", "mu_surf", "rho_c")]
     factors[:, drawn] = np.exp(np.random.default_rng(3).uniform(-0.7, 0.7, size=(len(starts), len(drawn))))
     batch.expand("numeric_data")[:, sand] *= factors
     sensors, state = batch.bind("sensordata"), {name: batch.bind(name) for name in ("qpos", "qvel")}

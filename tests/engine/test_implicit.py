@@ -7,7 +7,8 @@ import pytest
 import rftsim
 from rftsim.bench import hard_cases, stability
 from rftsim.files import Kept
-from rftsim.solver.state import HEAD, SPLIT
+from rftsim.law.layout import numbers_in, record
+from rftsim.solver.state import FLAGS
 from rftsim.solver.time_step import GAIN
 
 SAND = rftsim.Sand(xi_n=0.92e6, mu_surf=0.4)
@@ -87,7 +88,7 @@ def foreseen(trial, steps, before=None):
         if before is not None:
             before(data)
         mujoco.mj_step(model, data)
-        start = HEAD + 3 * model.nv
+        start = numbers_in(FLAGS) + 3 * model.nv
         expected = data.plugin_state[start : start + model.nv]
         if expected.any():
             worst = max(worst, np.abs(expected - data.qvel).max() / np.abs(data.qvel).max())
@@ -137,7 +138,7 @@ def test_random_starts_gain_no_energy(seed):
         mujoco.mj_step(model, data)
         sand = data.qfrc_passive - data.qfrc_spring - data.qfrc_damper - data.qfrc_gravcomp - data.qfrc_fluid
         assert 0.5 * 5e-3 * sand @ (before + data.qvel) < 1e-9
-        split += data.plugin_state[SPLIT] > 0.0
+        split += record(data.plugin_state, FLAGS).split > 0.0
     assert split > 5
     assert not trial.failed
 

@@ -13,11 +13,12 @@ import pytest
 
 import rftsim
 from rftsim.engine import layout
+from rftsim.law import layout as laws
 from rftsim.machine import build, link, sources
 
 PACKAGE = Path(rftsim.__file__).parent
 MODELS = Path(__file__).parents[2] / "models"
-PARTS = {"law": "", "engine": layout.GIVEN}
+PARTS = {"law": laws.GIVEN, "engine": layout.GIVEN}
 
 FIRST_FORCE = """
 import json, sys, time

@@ -184,7 +184,7 @@ def test_sand_can_be_changed_in_a_compiled_model():
     model = sandy()
     data = shaken(model)
     before = data.qfrc_passive.copy()
-    instances(model)[0].sand[10] *= 2.0
+    instances(model)[0].bed.xi_n *= 2.0
     mujoco.mj_forward(model, data)
     np.testing.assert_allclose(data.qfrc_passive, 2 * before, rtol=1e-14)
 

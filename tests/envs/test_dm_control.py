@@ -18,11 +18,9 @@ from rftsim_envs import dm
 from rftsim_models.wheels import GROUSER_WHEEL
 
 import rftsim
-from rftsim.law.layout import SAND_FIELDS
 from rftsim.run.run import run
 from rftsim.run.scenes import stage
 
-XI_N = SAND_FIELDS.index("xi_n")
 tasks = pytest.mark.parametrize(("domain", "task"), dm.ALL_TASKS)
 
 
@@ -176,7 +174,7 @@ def test_random_sand_is_drawn_within_its_range():
     own, drawn = rftsim.make_sand("poppy-seeds"), []
     for _ in range(20):
         env.reset()
-        drawn.append(bed.sand[XI_N] / own.xi_n)
+        drawn.append(bed.bed.xi_n / own.xi_n)
     assert STRENGTH[0] <= min(drawn) < 0.8 < 1.3 < max(drawn) <= STRENGTH[1]
 
 

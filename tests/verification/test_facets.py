@@ -11,11 +11,11 @@ from shapes import ONE, blob, rim
 
 from rftsim import PRESETS, FreeSurface, make_surface, surface_force
 from rftsim.law.laws import get_law
-from rftsim.law.layout import BLOCK, pack_sand
+from rftsim.law.layout import BLOCK, pack_bed
 from rftsim.reduction.facets import merged, settled, split
-from rftsim.reduction.reduce import DEPTHS, HELD_BACK, draw, errors, free_reach, reduced, wrenches
+from rftsim.reduction.reduce import DEPTHS, HELD_BACK, draw, errors, free_reach, reduced, scaled_wrenches
 
-BED = pack_sand(PRESETS["poppy-seeds"], get_law("rft3d"), FreeSurface(), (0, 1, 0))
+BED = pack_bed(PRESETS["poppy-seeds"], get_law("rft3d"), FreeSurface(), (0, 1, 0))
 
 
 def volume(surface):
@@ -86,7 +86,7 @@ def fresh_error(surface, facets, seeds, depths):
     worst = 0.0
     for seed in seeds:
         samples = draw(surface, BED, free_reach(seed), depths, seed)
-        pair = [wrenches(s, BED, samples) for s in (surface, facets)]
+        pair = [scaled_wrenches(s, BED, samples) for s in (surface, facets)]
         worst = max(worst, float(errors(*pair, samples.depth).max()))
     return worst
 

@@ -12,7 +12,7 @@ from shapes import ONE, alpha, blob, rotation, unit
 
 from rftsim import FreeSurface, Sand, Surface, make_surface, surface_force
 from rftsim.law import tables
-from rftsim.law.kernels import cubic, quartic
+from rftsim.law.polynomials import cubic, quartic
 from rftsim.sand.strength import xi_n_cubic
 from rftsim.surface.triangles import Wheel
 

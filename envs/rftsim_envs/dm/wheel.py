@@ -13,7 +13,6 @@ from dm_control.suite import base
 from dm_env import specs
 from rftsim_models.wheels import CARRIAGE, WHEEL, WheelParameters, build_wheel
 
-from rftsim.law.layout import STRENGTHS
 from rftsim.model.readout import instances, wrenches
 from rftsim.sand.medium import Sand
 from rftsim.sand.presets import make_sand
@@ -179,7 +178,7 @@ def set_strength(physics: Physics, sand: Sand, factor: float) -> None:
     assert sand.xi_n is not None
     assert sand.zeta is not None
     for bed in instances(physics.model.ptr):
-        bed.sand[STRENGTHS] = factor * sand.xi_n, factor * sand.zeta
+        bed.bed.xi_n, bed.bed.zeta = factor * sand.xi_n, factor * sand.zeta
 
 
 def rate_driven(parameters: WheelParameters, top_rate: float) -> mujoco.MjSpec:

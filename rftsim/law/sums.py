@@ -1,0 +1,153 @@
+"""The loops over a body's triangles: sums of force and moment, and the tractions themselves.
+
+Each is made for a response of the sand, see `laws`; they are what everything else calls.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rftsim.law import body as bodies
+from rftsim.law.frame import point_velocity
+from rftsim.law.free_surface import depth, rising, up
+from rftsim.law.laws import Response
+from rftsim.law.leading import reach2
+from rftsim.law.selection import CAPACITY, LOOK, area, centre, choosing, chosen_on_stack, filled_up, next_run, normal
+from rftsim.law.stress import TINY
+from rftsim.law.vectors import larger
+from rftsim.machine.compiling import inline, inline_loop, merged
+
+
+class Wrench(NamedTuple):
+    """Force and moment about the body's origin, body frame."""
+
+    fx: Any
+    fy: Any
+    fz: Any
+    tx: Any
+    ty: Any
+    tz: Any
+
+
+@merged
+def _added(total, g, x, y, z):
+    """A wrench and that of a force g at a point."""
+    gx, gy, gz = g
+    return Wrench(
+        total.fx + gx,
+        total.fy + gy,
+        total.fz + gz,
+        total.tx + (y * gz - z * gy),
+        total.ty + (z * gx - x * gz),
+        total.tz + (x * gy - y * gx),
+    )
+
+
+@inline
+def _nothing():
+    return Wrench(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@merged
+def _force(stress, weight, held):
+    """The force of a stress whose resistance counts by a depth times an area, its inertial term by `held` [N]."""
+    (sx, sy, sz), (mx, my, mz) = stress.per_depth, stress.along
+    return weight * sx + held * mx, weight * sy + held * my, weight * sz + held * mz
+
+
+@inline_loop
+def deepest(body, frame):
+    """The largest depth of a body's triangles [m]; any negative number where none is in the sand."""
+    found, last = -1e30, 0
+    while last < body.count:
+        first, last = next_run(body, last, frame, 0.0)
+        for i in range(first, last):
+            x, y, z = bodies.centre(body, i)
+            found = larger(found, depth(x, y, z, frame))
+    return found
+
+
+def sums(response: Response) -> Any:
+    """Make the sum of force and moment over a packed body, at the velocity of the moment."""
+    choose, stress, felt_depth = choosing(response, ahead=False), response.stress, response.felt_depth
+
+    @inline_loop
+    def add(chosen, n, frame, medium, edge, total):
+        for i in range(n):
+            x, y, z = centre(chosen, i)
+            v = point_velocity(frame, x, y, z)
+            s = stress(normal(chosen, i), v, up(x, y, z, frame), frame, medium, edge)
+            deep, a = depth(x, y, z, frame), area(chosen, i)
+            held = a * s.inertia if deep > 0.0 else 0.0
+            total = _added(total, _force(s, a * larger(felt_depth(deep, medium), 0.0), held), x, y, z)
+        return total
+
+    @inline_loop
+    def summed(body, frame, medium, edge):
+        """The sand's wrench on a body."""
+        chosen, n, reach, total, last = chosen_on_stack(), 0, reach2(edge), _nothing(), 0
+        while last < body.count:
+            n, last = choose(body, last, frame, 0.0, reach, 0.0, chosen, n)
+            if n > CAPACITY - LOOK or last >= body.count:
+                total, n = add(chosen, filled_up(chosen, n), frame, medium, edge, total), 0
+        return total
+
+    return summed
+
+
+def sums_ahead(response: Response) -> Any:
+    """Make the sums of a law made continuous at rest, now and at the depths after a time h of this motion.
+
+    The resistance is scaled by |v| / sqrt(|v|^2 + v_c^2): the force of a law that knows only the direction of motion
+    falls to zero at rest.
+    """
+    choose, stress, felt_depth = choosing(response, ahead=True), response.stress, response.felt_depth
+
+    @inline_loop
+    def add(chosen, n, frame, medium, edge, v_c, h, now, after):
+        for i in range(n):
+            (x, y, z), n_hat, a = centre(chosen, i), normal(chosen, i), area(chosen, i)
+            v = point_velocity(frame, x, y, z)
+            speed2 = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
+            slow = np.sqrt(speed2 / (speed2 + v_c * v_c + TINY))
+            s = stress(n_hat, v, up(x, y, z, frame), frame, medium, edge)
+            deep = depth(x, y, z, frame)
+            later = deep - h * rising(v, frame)
+            held = a * s.inertia if deep > 0.0 else 0.0
+            now = _added(now, _force(s, slow * a * larger(felt_depth(deep, medium), 0.0), held), x, y, z)
+            held = a * s.inertia if later > 0.0 else 0.0
+            after = _added(after, _force(s, slow * a * larger(felt_depth(later, medium), 0.0), held), x, y, z)
+        return now, after
+
+    @inline_loop
+    def summed(body, frame, medium, edge, v_c, h, margin):
+        """The wrench at the present depths, and that at the later ones; no triangle moves further than the margin."""
+        chosen, n, reach, last = chosen_on_stack(), 0, reach2(edge), 0
+        now, after = _nothing(), _nothing()
+        while last < body.count:
+            n, last = choose(body, last, frame, margin, reach, h, chosen, n)
+            if n > CAPACITY - LOOK or last >= body.count:
+                now, after = add(chosen, filled_up(chosen, n), frame, medium, edge, v_c, h, now, after)
+                n = 0
+        return now, after
+
+    return summed
+
+
+def tractions(response: Response) -> Any:
+    """Make the loop that fills each triangle's stress [Pa], (ntri, 3), and effective depth [m], (ntri,)."""
+    stress, felt_depth = response.stress, response.felt_depth
+
+    @inline_loop
+    def filled(body, frame, medium, edge, stress_out, depth_out):
+        for i in range(depth_out.size):
+            x, y, z = bodies.centre(body, i)
+            v = point_velocity(frame, x, y, z)
+            deep = depth(x, y, z, frame)
+            s = stress(bodies.normal(body, i), v, up(x, y, z, frame), frame, medium, edge)
+            held = s.inertia if deep > 0.0 else 0.0
+            depth_out[i] = deep
+            force = _force(s, larger(felt_depth(deep, medium), 0.0), held)
+            stress_out[i, 0], stress_out[i, 1], stress_out[i, 2] = force
+
+    return filled

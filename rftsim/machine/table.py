@@ -1,0 +1,141 @@
+"""Tables of addresses: arrays that compiled functions share, declared one by one and laid out in one piece of memory.
+
+What works on a table takes its address p alone: it can so be compiled once, and called apart, whatever it works on.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from rftsim.machine.compiling import exact, inline
+from rftsim.machine.memory import doubles, int64s, matrix
+from rftsim.machine.records import record_at, record_behind, records_behind
+
+Size = int | str
+"""A number, or the name of a count of the table."""
+
+
+class Table:
+    """A table: a head of int64, then the address of each array that was declared.
+
+    Args:
+        head: The head's fields, of which the first are counts.
+        counts: The names of those, by which sizes are given.
+    """
+
+    def __init__(self, head: "np.dtype[Any]", counts: tuple[str, ...]) -> None:
+        self.head = record_at(head)
+        """The head of the table at p."""
+        self._names, self._counts = head.names or (), counts
+        self._sizes: list[list[int]] = []
+        """For each array a constant, and the powers of the counts, that make its size."""
+
+    @property
+    def size(self) -> int:
+        """Numbers of the table itself, int64."""
+        return len(self._names) + len(self._sizes)
+
+    def vector(self, size: Size, view: Any = doubles) -> Any:
+        """Declare an array of one axis, and make what gives it from p."""
+        entry, n = self._declare(size), self._number(size)
+
+        @exact
+        def get(p):
+            return view(_address(p, entry), n(p))
+
+        return get
+
+    def matrix(self, rows: Size, columns: Size) -> Any:
+        """Declare an array of two axes, and make what gives it from p."""
+        entry, m, n = self._declare(rows, columns), self._number(rows), self._number(columns)
+
+        @exact
+        def get(p):
+            return matrix(_address(p, entry), m(p), n(p))
+
+        return get
+
+    def vectors(self, size: Size, *count: Size) -> Any:
+        """Declare as many vectors as the product of counts says, and make what gives the k-th from p and k."""
+        entry, n = self._declare(size, *count), self._number(size)
+
+        @exact
+        def get(p, k):
+            return doubles(_address(p, entry) + 8 * k * n(p), n(p))
+
+        return get
+
+    def each(self, count: str, rows: int, columns: "Size | None" = None) -> tuple[Any, Any]:
+        """Declare an array for each of a count, and make what gives the k-th from p and k, and all of them flat."""
+        entry, n, m = self._declare(count, rows, columns or 1), self._number(columns or 1), self._number(count)
+
+        @exact
+        def vector(p, k):
+            return doubles(_address(p, entry) + 8 * k * rows, rows)
+
+        @exact
+        def one(p, k):
+            return matrix(_address(p, entry) + 8 * k * rows * n(p), rows, n(p))
+
+        @exact
+        def flat(p):
+            return doubles(_address(p, entry), m(p) * rows * n(p))
+
+        return vector if columns is None else one, flat
+
+    def record(self, dtype: "np.dtype[Any]") -> Any:
+        """Declare a record of float64, and make what gives it from p."""
+        return record_behind(dtype, self._declare(dtype.itemsize // 8))
+
+    def records(self, dtype: "np.dtype[Any]", count: Size) -> Any:
+        """Declare records of float64, and make what gives the k-th from p and k."""
+        return records_behind(dtype, self._declare(count, dtype.itemsize // 8))
+
+    def outer(self, dtype: "np.dtype[Any]", name: str) -> Any:
+        """Make what gives, from p, the record whose address a field of the head holds."""
+        return record_behind(dtype, self._names.index(name))
+
+    def layout(self) -> Any:
+        """A compiled function that fills the table at p with addresses from one on; it gives the one behind."""
+        sizes, outer = np.array(self._sizes), len(self._names)
+        powers, whole = sizes.shape[1], self.size
+
+        @exact
+        def lay_out(p, at):
+            table = int64s(p, whole)
+            for array in range(len(sizes)):
+                size = sizes[array, 0]
+                for count in range(1, powers):
+                    for _ in range(sizes[array, count]):
+                        size *= table[count - 1]
+                table[outer + array] = at
+                at += 8 * size
+            return at
+
+        return lay_out
+
+    def _declare(self, *shape: Size) -> int:
+        """Make place for an array; where its address stands in the table."""
+        constant = int(np.prod([size for size in shape if isinstance(size, int)], dtype=int))
+        self._sizes.append([constant, *(shape.count(name) for name in self._counts)])
+        return len(self._names) + len(self._sizes) - 1
+
+    def _number(self, size: Size) -> Any:
+        """Make what gives a size from p."""
+        entry = -1 if isinstance(size, int) else self._counts.index(size)
+
+        @inline
+        def constant(p):
+            return size
+
+        @inline
+        def counted(p):
+            return _address(p, entry)
+
+        return constant if isinstance(size, int) else counted
+
+
+@inline
+def _address(p, entry):
+    """An address, or a count, of the table at p."""
+    return int64s(p, entry + 1)[entry]
