@@ -15,7 +15,7 @@ FUNCTIONS = [function for path in PATHS for function in house.functions(path)]
 FLOORS = 12
 """Rooms of rftsim that stand on one another, at most."""
 ROOMS = [path.parent.name for path in sorted((house.ROOT / "rftsim").glob("*/__init__.py"))] + ["errors", "files"]
-PACKED = r"\b(sand|bed|body|header|surface|numbers|packed|table|block|frame|chosen|f)\[\d+(:\d+)?\]"
+PACKED = r"\b(sand|bed|body|header|surface|numbers|packed|table|block|frame|chosen)\[\d+(:\d+)?\]"
 """What a literal index into a packed array looks like."""
 COMPILED = ("rftsim/law", "rftsim/solver", "rftsim/engine", "rftsim/machine")
 

@@ -85,29 +85,20 @@ class Terms(NamedTuple):
 
 
 @merged
-def _entry(t, row, column):
-    """Derivative of one component of a triangle's force by one of its velocity."""
-    return (
-        t.first[row] * t.aside.first[column]
-        + t.second[row] * t.aside.second[column]
-        + t.along * t.resistance[row] * t.aside.ahead[column]
-        + t.brake * t.inertial[row] * t.inertial[column]
-        + t.edge * t.normal[row] * t.normal[column]
-    )
-
-
-@merged
 def _fill_matrix(k, i, t):
     """Fill the derivative of the i-th triangle's force by its velocity into a scratch, row by row."""
-    k[i] = _entry(t, 0, 0)
-    k[i + 1 * BLOCK] = _entry(t, 0, 1)
-    k[i + 2 * BLOCK] = _entry(t, 0, 2)
-    k[i + 3 * BLOCK] = _entry(t, 1, 0)
-    k[i + 4 * BLOCK] = _entry(t, 1, 1)
-    k[i + 5 * BLOCK] = _entry(t, 1, 2)
-    k[i + 6 * BLOCK] = _entry(t, 2, 0)
-    k[i + 7 * BLOCK] = _entry(t, 2, 1)
-    k[i + 8 * BLOCK] = _entry(t, 2, 2)
+    (a, b, c), (p0, p1, p2), (q0, q1, q2) = t.aside.ahead, t.aside.first, t.aside.second
+    (e0, e1, e2), (f0, f1, f2), along, (s0, s1, s2) = t.first, t.second, t.along, t.resistance
+    brake, (i0, i1, i2), edge, (m0, m1, m2) = t.brake, t.inertial, t.edge, t.normal
+    k[i] = e0 * p0 + f0 * q0 + along * s0 * a + brake * i0 * i0 + edge * m0 * m0
+    k[i + 1 * BLOCK] = e0 * p1 + f0 * q1 + along * s0 * b + brake * i0 * i1 + edge * m0 * m1
+    k[i + 2 * BLOCK] = e0 * p2 + f0 * q2 + along * s0 * c + brake * i0 * i2 + edge * m0 * m2
+    k[i + 3 * BLOCK] = e1 * p0 + f1 * q0 + along * s1 * a + brake * i1 * i0 + edge * m1 * m0
+    k[i + 4 * BLOCK] = e1 * p1 + f1 * q1 + along * s1 * b + brake * i1 * i1 + edge * m1 * m1
+    k[i + 5 * BLOCK] = e1 * p2 + f1 * q2 + along * s1 * c + brake * i1 * i2 + edge * m1 * m2
+    k[i + 6 * BLOCK] = e2 * p0 + f2 * q0 + along * s2 * a + brake * i2 * i0 + edge * m2 * m0
+    k[i + 7 * BLOCK] = e2 * p1 + f2 * q1 + along * s2 * b + brake * i2 * i1 + edge * m2 * m1
+    k[i + 8 * BLOCK] = e2 * p2 + f2 * q2 + along * s2 * c + brake * i2 * i2 + edge * m2 * m2
 
 
 def derivative(response: Response) -> Any:
@@ -144,8 +135,7 @@ def derivative(response: Response) -> Any:
             across = share * weight / STEP_ASIDE
             brake = (2.0 * area if deep > 0.0 else 0.0) / smaller(v[0] * i0 + v[1] * i1 + v[2] * i2, -TINY)
             first, second = _changed(across, one, s.per_depth), _changed(across, two, s.per_depth)
-            terms = Terms(aside, first, second, along, s.per_depth, brake, inertial, jump, s.along)
-            _fill_matrix(k, i, terms)
+            _fill_matrix(k, i, Terms(aside, first, second, along, s.per_depth, brake, inertial, jump, s.along))
 
     @loop
     def add_chosen(chosen, n, frame, medium, edge, v_c, completed, out):

@@ -25,7 +25,7 @@ _MEDIUM: Final = [("dynamic", "f8"), *((name, "f8") for name in PARAMETERS), ("t
 
 BED: Final = np.dtype([("response", "f8"), ("up", "f8", 3), ("offset", "f8"), ("plane", "f8", 3), *_MEDIUM])
 """Packed sand: its law's place in RESPONSES, normal and offset of the free surface, normal of the plane of motion,
-whether the law is dynamic (0 or 1), the parameters (NaN where unknown), and the coefficients of f1, f2 and f3."""
+whether the law is dynamic (0 or 1), the parameters (zero where unknown), and the coefficients of f1, f2 and f3."""
 
 Medium = namedtuple("Medium", [name for name, *_ in _MEDIUM])  # type: ignore[misc]
 Medium.__doc__ = "The sand as a law reads it: fields of BED, which compiled loops keep in registers."
@@ -109,7 +109,7 @@ def pack_bed(sand: Sand, law: Law, terrain: FreeSurface, plane: ArrayLike) -> Ar
     bed.up, bed.offset, bed.plane = up, terrain.offset, normal / length
     for name in PARAMETERS:
         value = getattr(sand, name)
-        bed[name] = np.nan if value is None else value
+        bed[name] = 0.0 if value is None else value  # MuJoCo reads no NaN from XML
     for row, column in zip(bed.table, tables.columns(law.table), strict=True):
         row[: len(column)] = column
     return numbers

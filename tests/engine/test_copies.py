@@ -115,8 +115,7 @@ def test_batch_with_sand_of_its_own_in_each_simulation():
     model = sandy()
     batch = batch_of(model, np.zeros((3, mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS))), 2)
     batch.bind("qpos")[:], batch.bind("qvel")[:, 2] = model.qpos0, -1.0
-    numbers, address = batch.expand("numeric_data"), model.numeric("rftsim-sand:sand").adr[0]
-    numbers[1, address + 10] *= 2.0
+    instances(model)[0].beds_in(batch.expand("numeric_data"))["xi_n"][1] *= 2.0
     sensors = batch.bind("sensordata")
     batch.step()
     assert sensors[0, 2] > 1.0
