@@ -30,7 +30,7 @@ SHORTEST: Final = 2e-3
 LITERAL: Final = 100_000
 """Sizes up to here are timed in NumPy, too."""
 ROUNDS: Final = 30
-"""Of which the fastest counts."""
+"""Repetitions of each measurement, of which the fastest counts."""
 SAND: Final = Sand(xi_n=2e5, mu_surf=0.4)
 LAW: Final = "rft3d"
 _OPERATIONS: Final = 64
@@ -48,7 +48,7 @@ class Cost(NamedTuple):
     oracle_seconds: float
     """The same in the tests' NumPy; nan where it was not measured."""
     bytes: int
-    """Of the packed body."""
+    """Size of the packed body in memory."""
     leading: float
     """Share of the triangles that lead; the law is evaluated on no others."""
 
@@ -74,7 +74,7 @@ class Arithmetic(NamedTuple):
     operations: float
     """Floating-point operations of the compiled loop for each triangle; a fused multiplication and addition is one."""
     nanoseconds: float
-    """Of as many fused multiplications and additions that do not wait for one another."""
+    """Time of as many fused multiplications and additions that do not wait for one another."""
 
 
 def measure(sizes: tuple[int, ...], oracle: ModuleType | None, report: Callable[[str], Any]) -> list[Cost]:

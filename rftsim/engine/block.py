@@ -13,6 +13,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from rftsim.law.layout import WRENCH
 from rftsim.machine import registry
 from rftsim.machine.kernel import exact_kernel
 
@@ -20,8 +21,6 @@ CHUNK: Final = 500
 """Numbers of one numeric: MuJoCo's XML reader takes no more. A surface goes on in the numerics behind its first."""
 BODY_MARKER: Final = "rftsim-body:"
 SAND_MARKER: Final = "rftsim-sand:"
-WRENCH: Final = 6
-"""Numbers of a wrench: force, then moment about the body's origin, in the world frame."""
 BLOCK_HEAD: Final = np.dtype([("nbody", "i8"), ("bed", "i8")])
 """Number of bodies, and the numeric of the bed."""
 MEMBER: Final = np.dtype([("body", "i8"), ("numeric", "i8")])

@@ -5,8 +5,8 @@ from typing import Final
 from numba import types
 
 from rftsim.engine import explicit, implicit, instance, offsets
-from rftsim.engine.block import WRENCH
 from rftsim.engine.layout import CONSTANTS
+from rftsim.law.layout import WRENCH
 from rftsim.machine import claims
 from rftsim.machine.compiling import inline
 from rftsim.machine.exports import address, entry

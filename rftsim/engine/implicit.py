@@ -56,7 +56,7 @@ def _fill_mass(model, data, m, d, p):
 
 @inline
 def _fill_drag(model, data, m, d, p):
-    """What the integrator takes implicitly, over the time step; whether there is any."""
+    """Fill the drag that the integrator takes implicitly, over the time step; whether there is any."""
     out = equation.drag(p)
     nv = out.shape[0]
     for i in range(nv):
@@ -131,7 +131,7 @@ def _fill_row_jacobian(model, data, m, d, p):
 
 @inline
 def _fill_row_laws(data, contact, d, p):
-    """What the force of each constraint row depends on: its kind, bound, damping and spring."""
+    """Fill each constraint row's kind, bound, damping and spring."""
     n = equation.head(p).nrow
     kind, bound = equation.row_kind(p), equation.row_bound(p)
     damping, spring = equation.row_damping(p), equation.row_spring(p)
@@ -210,8 +210,8 @@ def press(model, data, contact, m, d, number):
     instance.count(address, 0.0)
     rows = int32s(d + data.nefc, 1)[0]
     p = stack_doubles(TABLE)
-    memory = take(equation.lay_out(p, 0 * nbody, nbody, nv, rows))
-    equation.lay_out(p, memory, nbody, nv, rows)
+    memory = take(equation.lay_out(p, nbody, nv, rows))
+    equation.place(p, memory)
     head = equation.head(p)
     head.old, head.new = old.ctypes.data, instance.pending(address, old.size).ctypes.data
     head.work = instance.counters(address)

@@ -1,8 +1,8 @@
 """A plugin instance for compiled code: its bodies and its block of memory, see `block`."""
 
 from rftsim.engine import block
-from rftsim.engine.block import BODY_MARKER, SAND_MARKER, WRENCH
-from rftsim.law.layout import BED, numbers_in
+from rftsim.engine.block import BODY_MARKER, SAND_MARKER
+from rftsim.law.layout import BED, WRENCH, numbers_in
 from rftsim.machine import claims
 from rftsim.machine.compiling import exact, inline
 from rftsim.machine.memory import characters, doubles, int32s, int64s, pointer

@@ -50,7 +50,7 @@ CONSTANTS: Final = {
 }
 """Those that are compiled in."""
 GIVEN: Final = repr(CONSTANTS)
-"""What machine code of the engine is made from beside its sources."""
+"""All that machine code of the engine is made from beside its sources."""
 FUNCTIONS: Final = ("mj_fwdActuation", "mj_rne", "mj_referenceConstraint", "mj_isSparse", "mjd_smooth_vel")
 """Those that compiled code calls by name, see `external`."""
 SYMBOL: Final = "rftsim_layout"

@@ -43,7 +43,7 @@ HEADER: Final = np.dtype(
         ("rim_start", "f8", 3),
     ]
 )
-"""What a packed surface starts with: leading-edge tolerance; lowest and highest corner [m]; axis, centre [m] and radius
+"""The head of a packed surface: leading-edge tolerance; lowest and highest corner [m]; axis, centre [m] and radius
 [m] of a wheel, zero where it is none; number of triangles; their root-mean-square distance from the origin [m]; the
 direction at which the wheel's angles start."""
 
@@ -72,8 +72,10 @@ RIM: Final = 0.7
 NO_RIM: Final = 9.0
 """Instead of the angle about the axis, of a wheel's other triangles. Behind its boxes stand each triangle's."""
 
+WRENCH: Final = 6
+"""Numbers of a wrench: force, then moment about the body's origin; in memory always in the world frame."""
 GIVEN: Final = repr(BED.descr)
-"""What machine code of the laws is made from beside its sources: the sand's parameters."""
+"""All that machine code of the laws is made from beside its sources: the sand's parameters."""
 
 
 def numbers_in(dtype: "np.dtype[Any]") -> int:
@@ -90,7 +92,7 @@ def pack_bed(sand: Sand, law: Law, terrain: FreeSurface, plane: ArrayLike) -> Ar
     """Sand under a law as numbers, a record of BED.
 
     Raises:
-        SandError: The law reads a parameter that is unknown of the sand.
+        SandError: The law reads a parameter that is unknown of the sand, or is not one of LAWS nor made from one.
         ValueError: The plane's normal is not horizontal.
     """
     up = np.array(terrain.normal)
@@ -98,6 +100,8 @@ def pack_bed(sand: Sand, law: Law, terrain: FreeSurface, plane: ArrayLike) -> Ar
     length = np.linalg.norm(normal)
     if normal.shape != (3,) or not length > 0.0 or (law.planar and abs(normal @ up) > 1e-6 * length):
         raise ValueError(f"the normal of the plane of motion must be horizontal, as (0, 1, 0) is, not {plane!r}")
+    if law.response not in RESPONSES:
+        raise SandError(f"no machine code was made for the law {law.name}: add it to LAWS, and `make native`")
     unknown = [name for name in law.reads if getattr(sand, name) is None]
     if "rho_c" in unknown:
         sand.density()

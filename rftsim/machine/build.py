@@ -23,9 +23,9 @@ _GIVING: Final = ("machine.link", "law.layout", "engine.layout")
 """The modules that know what the machine code is keyed by."""
 _C: Final = {numba_types.void: "void", numba_types.intp: "i64", numba_types.intc: "i32", numba_types.float64: "double"}
 _OUTSIDE: Final = re.compile(r"rftsim_\w+|mjd?_\w+|PyMem_RawMalloc|PyMem_RawCalloc|PyMem_RawFree|atan2|sqrt|llvm\..*")
-"""What an object may need from elsewhere."""
+"""Names that an object may take from elsewhere."""
 _RAISED: Final = re.compile(r'(@\.const\.pickledata\.\S+ = .*\[\d+ x i8\]) c"[^"]*"')
-"""What numba would raise, which may name files of this machine; nobody reads it."""
+"""Errors that numba would raise, which may name files of this machine; nobody reads them."""
 _FAILED: Final = "rftsim_failed"
 _UNCOUNTED: Final = "define void @NRT_MemInfo_call_dtor(ptr %memory) { unreachable }"
 """Every array here is a view of memory that nobody counts references to."""
@@ -81,7 +81,7 @@ def _entry(name: str, signature: Any, compiled: str) -> str:
 
 
 def _machine(cpu: str | None) -> llvm.TargetMachine:
-    """What emits code as numba's own does."""
+    """Make what emits code as numba's own does."""
     features = llvm.get_host_cpu_features().flatten() if cpu is None else ""
     return llvm.Target.from_default_triple().create_target_machine(
         cpu=cpu or llvm.get_host_cpu_name(), features=features, opt=3, reloc="static", codemodel="jitdefault", jit=True

@@ -3,14 +3,16 @@
 What works on a table takes its address p alone: it can so be compiled once, and called apart, whatever it works on.
 """
 
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
 from rftsim.machine.compiling import exact, inline
-from rftsim.machine.memory import doubles, int64s, matrix
+from rftsim.machine.memory import doubles, int64s, matrix, stack_doubles
 from rftsim.machine.records import record_at, record_behind, records_behind
 
+_POWERS: Final = 3
+"""Powers of a count that a size can hold, from zero on."""
 Size = int | str
 """A number, or the name of a count of the table."""
 
@@ -96,26 +98,42 @@ class Table:
         return record_behind(dtype, self._names.index(name))
 
     def layout(self) -> Any:
-        """A compiled function that fills the table at p with addresses from one on; it gives the one behind."""
-        sizes, outer = np.array(self._sizes), len(self._names)
-        powers, whole = sizes.shape[1], self.size
+        """A compiled function that fills the table at p with distances from one place, and gives all arrays' bytes."""
+        sizes, outer, whole, counts = np.array(self._sizes), len(self._names), self.size, len(self._counts)
+        room = counts * _POWERS
 
         @exact
-        def lay_out(p, at):
-            table = int64s(p, whole)
+        def lay_out(p):
+            table, powers, at = int64s(p, whole), int64s(stack_doubles(room), room), 0
+            for count in range(counts):
+                powers[_POWERS * count] = 1
+                for power in range(1, _POWERS):
+                    powers[_POWERS * count + power] = powers[_POWERS * count + power - 1] * table[count]
             for array in range(len(sizes)):
                 size = sizes[array, 0]
-                for count in range(1, powers):
-                    for _ in range(sizes[array, count]):
-                        size *= table[count - 1]
+                for count in range(counts):
+                    size *= powers[_POWERS * count + sizes[array, count + 1]]
                 table[outer + array] = at
                 at += 8 * size
             return at
 
         return lay_out
 
+    def place(self) -> Any:
+        """A compiled function that makes addresses, from one on, of the distances in the table at p."""
+        outer, whole = len(self._names), self.size
+
+        @exact
+        def place(p, address):
+            table = int64s(p, whole)
+            for entry in range(outer, whole):
+                table[entry] += address
+
+        return place
+
     def _declare(self, *shape: Size) -> int:
         """Make place for an array; where its address stands in the table."""
+        assert all(shape.count(name) < _POWERS for name in self._counts)
         constant = int(np.prod([size for size in shape if isinstance(size, int)], dtype=int))
         self._sizes.append([constant, *(shape.count(name) for name in self._counts)])
         return len(self._names) + len(self._sizes) - 1

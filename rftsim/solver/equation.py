@@ -10,25 +10,25 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from rftsim.law import step_frame
+from rftsim.law.layout import WRENCH
 from rftsim.machine.compiling import exact, inline
-from rftsim.machine.memory import int64s
+from rftsim.machine.memory import doubles, int64s
 from rftsim.machine.table import Table
 from rftsim.solver.state import State, state_size
 
 TABLE_HEAD: Final = np.dtype([(name, "i8") for name in ("nbody", "nv", "nrow", "sand", "work", "old", "new", "before")])
-"""What a table starts with: the counts; then addresses, of the packed sand, of the counters of WORK, and of three
+"""The head of a table: the counts; then addresses, of the packed sand, of the counters of WORK, and of three
 states: after the last step, after this one, and a copy of the former to forget parts of."""
 WORK: Final = np.dtype([("evaluations", "f8"), ("derivatives", "f8"), ("unsolved", "f8")])
-"""What solutions cost, counted up: evaluations of every body's force, of its derivative, and equations unsolved."""
+"""The cost of solutions, counted up: evaluations of every body's force, of its derivative, and equations unsolved."""
 NUMBERS: Final = np.dtype(
     [("timestep", "f8"), ("h", "f8"), ("impulse", "f8"), ("v_c", "f8"), ("knows_derivative", "f8"), ("solved", "f8")]
 )
 """MuJoCo's time step [s]; that of the equation [s]; size of the impulse h tau; speed below which a triangle's stress
 falls to zero [m/s]; whether `derivative` is known; whether the equation was solved."""
 SCORES: Final = np.dtype([("missing", "f8"), ("scale", "f8"), ("error", "f8")])
-"""Of a tried velocity: size of the missing impulse, size of all impulses, error of the bodies' speeds over what is
-allowed."""
-
+"""Scores of a tried velocity: size of the missing impulse, size of all impulses, and error of the bodies' speeds over
+what is allowed."""
 PROGRESS: Final = np.dtype(
     [
         (name, "f8")
@@ -38,9 +38,9 @@ PROGRESS: Final = np.dtype(
         )
     ]
 )
-"""Of a solution under way: whether there is a derivative at all, it should be taken anew, and was taken at the present
-point; whether the direction comes from the completed one, and for how many more steps; how often the direction was
-shortened, and failed; iterations; factor on the tolerance; share of the direction that is tried."""
+"""State of a solution under way: whether there is a derivative at all, it should be taken anew, and was taken at the
+present point; whether the direction comes from the completed one, and for how many more steps; how often the direction
+was shortened, and failed; iterations; factor on the tolerance; share of the direction that is tried."""
 
 
 class Kinds(NamedTuple):
@@ -83,7 +83,7 @@ jacobian, _ = _T.each("nbody", 6, "nv")
 rotation, _ = _T.each("nbody", 9)
 """Body to world, row-major, (9,)."""
 frame, frames = _T.each("nbody", step_frame.STEP_FRAME_NUMBERS)
-"""What fixes a body's depths, numbers of `step_frame.STEP_FRAME`; moved in the parts of a split step."""
+"""Numbers that fix a body's depths, see `step_frame.STEP_FRAME`; moved in the parts of a split step."""
 _, first_frames = _T.each("nbody", step_frame.STEP_FRAME_NUMBERS)
 """The same at the start of the step, of all bodies."""
 length = _T.vector("nbody")
@@ -152,7 +152,7 @@ residual_of = _T.vectors("nv", _POINTS)
 """The impulse that is missing there, (nv,)."""
 scores = _T.records(SCORES, _POINTS)
 """Record SCORES of point k."""
-_wrenches_of = _T.vectors(6, _POINTS, "nbody", 2)
+_wrenches_of = _T.vectors(WRENCH, _POINTS, "nbody", 2)
 end = _T.vector("nv")
 """Generalised velocity at the end of the step, (nv,)."""
 linear = _T.matrix("nv", "nv")
@@ -228,7 +228,7 @@ true_end = _T.vector("nv")
 
 TABLE: Final = _T.size
 """Numbers of a table, int64."""
-_lay_out_arrays = _T.layout()
+_lay_out_arrays, _place_arrays = _T.layout(), _T.place()
 
 
 @inline
@@ -238,18 +238,31 @@ def wrench_of(p, k, b, later):
 
 
 @inline
+def wrenches_of(p, k):
+    """All bodies' wrenches at point k, at both depths, (12 nbody,)."""
+    return doubles(wrench_of(p, k, 0, 0).ctypes.data, 2 * WRENCH * head(p).nbody)
+
+
+@inline
 def state(p, address):
     """The state at an address, of as many bodies and degrees of freedom as the equation has."""
     return State(address, head(p).nbody, head(p).nv)
 
 
 @exact
-def lay_out(p, at, nbody, nv, nrow):
-    """Fill the table at p with addresses from `at` on; the address behind the last.
+def lay_out(p, nbody, nv, nrow):
+    """Fill the table at p for so many bodies, degrees of freedom and rows; the bytes that its arrays take."""
+    counts = head(p)
+    counts.nbody, counts.nv, counts.nrow = nbody, nv, nrow
+    counts.before = _lay_out_arrays(p)
+    return counts.before + 8 * state_size(nbody, nv)
+
+
+@exact
+def place(p, address):
+    """Place the arrays of a table that was laid out at an address.
 
     The outer addresses of sand, work, old and new state are for the caller to fill.
     """
-    counts = head(p)
-    counts.nbody, counts.nv, counts.nrow = nbody, nv, nrow
-    counts.before = _lay_out_arrays(p, at)
-    return counts.before + 8 * state_size(nbody, nv)
+    head(p).before += address
+    _place_arrays(p, address)

@@ -69,9 +69,6 @@ def copy_point(p, origin, target):
     """Copy a point: its velocity, residual, wrenches and scores."""
     linear_algebra.copy(equation.velocity_of(p, origin), equation.velocity_of(p, target))
     linear_algebra.copy(equation.residual_of(p, origin), equation.residual_of(p, target))
-    for b in range(equation.head(p).nbody):
-        for later in range(2):
-            wrench = equation.wrench_of(p, origin, b, later)
-            linear_algebra.copy(wrench, equation.wrench_of(p, target, b, later))
+    linear_algebra.copy(equation.wrenches_of(p, origin), equation.wrenches_of(p, target))
     known, copied = equation.scores(p, origin), equation.scores(p, target)
     copied.missing, copied.scale, copied.error = known.missing, known.scale, known.error

@@ -106,3 +106,10 @@ def test_what_a_law_reads_must_be_known():
     """A dynamic law on sand of unknown density is refused when it is packed."""
     with pytest.raises(ValueError, match="need the sand's density: give rho_c"):
         pack_bed(PRESETS["medium-sand"], LAWS["drft3d"], FreeSurface(), (0.0, 1.0, 0.0))
+
+
+def test_a_law_without_machine_code_is_refused():
+    """A response that is in no law of LAWS, which the compiled loops cannot know."""
+    other = LAWS["rft3d"].response._replace(reads=("xi_n",))
+    with pytest.raises(ValueError, match="no machine code was made for the law mine"):
+        pack_bed(PRESETS["poppy-seeds"], LAWS["rft3d"]._replace(name="mine", response=other), FreeSurface(), (0, 1, 0))
