@@ -21,9 +21,9 @@ class Particles:
     v: Array
     """Velocities, (n, dim) [m/s]."""
     mass: Array
-    """(n,) [kg, in the plane kg/m]."""
+    """Masses, (n,) [kg, in the plane kg/m]."""
     volume: Array
-    """(n,) [m^3, in the plane m^2]."""
+    """Volumes, pores included, (n,) [m^3, in the plane m^2]."""
     stress: Array
     """Cauchy stress, tension positive, (n, 4 or 6) [Pa]."""
     theta: Array
@@ -33,37 +33,37 @@ class Particles:
     strain: Array
     """Equivalent plastic shear strain, (n,) [-]."""
     number: NDArray[np.int64]
-    """What the particle was before any sorting, (n,)."""
+    """Place of each particle in the order before any sorting, (n,)."""
 
     def __len__(self) -> int:
         return len(self.x)
 
     @property
     def dim(self) -> int:
-        """Dimensions of space."""
+        """Dimensions of space: 2 for plane strain, or 3."""
         return int(self.x.shape[1])
 
     @property
     def pressure(self) -> Array:
-        """(n,) [Pa]."""
+        """Mean of the three normal stresses, compression positive, shape (n,) [Pa]."""
         found: Array = -self.stress[:, :3].sum(axis=1) / 3.0
         return found
 
     @property
     def shear(self) -> Array:
-        """Equivalent shear stress tau, (n,) [Pa]."""
+        """Equivalent shear stress tau of each particle, shape (n,) [Pa]."""
         normal = self.stress[:, :3] + self.pressure[:, None]
         found: Array = np.sqrt(0.5 * (normal**2).sum(axis=1) + (self.stress[:, 3:] ** 2).sum(axis=1))
         return found
 
     @property
     def packing(self) -> Array:
-        """Packing fraction phi, (n,) [-]."""
+        """Packing fraction phi of each particle, shape (n,) [-]."""
         return np.exp(self.theta)
 
     @property
     def momentum(self) -> Array:
-        """(dim,) [kg m/s]."""
+        """Sum of the momentum of all particles, shape (dim,) [kg m/s]."""
         found: Array = self.mass @ self.v
         return found
 
@@ -93,13 +93,13 @@ def level_bed(
     phi: float | None = None,
     ppc: int = 2,
 ) -> Particles:
-    """Sand at rest in equilibrium, from the origin to `size`.
+    """Return sand at rest in equilibrium, from the origin to `size`.
 
     Args:
         material: The sand.
         size: Extent along each axis [m], the last one up; whole numbers of cells.
         dx: Size of a cell [m].
-        gravity: [m/s^2].
+        gravity: Acceleration along -z [m/s^2].
         phi: Packing fraction of a stress-free particle; the critical one if not given.
         ppc: Particles per cell along each axis.
     """

@@ -15,15 +15,16 @@ from rftsim_mpm.simulation import SORT_EVERY, Simulation
 
 
 class Throughput(NamedTuple):
-    """Of one process."""
+    """How fast one process updates particles, and of how many."""
 
     particles: int
+    """How many particles the process updated in each step."""
     updates_per_s: float
-    """Best of the repetitions."""
+    """Particle-updates per second, of the fastest repetition [1/s]."""
 
 
 def problem(dim: int, *, small: bool = False) -> Simulation:
-    """A plate 10 mm deep in a bed and moving down: 98,000 particles in the plane, 108,000 in space."""
+    """Return a plate 10 mm deep in a bed and moving down: 98,000 particles in the plane, 108,000 in space."""
     material = Material.of_density(0.4, 1512.0, 1e6)
     size: tuple[float, ...] = (0.3, 0.1) if small else (0.6, 0.25)
     dx = 2.5e-3
@@ -38,7 +39,7 @@ def problem(dim: int, *, small: bool = False) -> Simulation:
 
 
 def throughput(dim: int, *, repetitions: int = 3, small: bool = False) -> Throughput:
-    """Run full steps, contact and sorting included, after the sand has begun to yield."""
+    """Time full steps, contact and sorting included, after the sand has begun to yield."""
     if repetitions < 1:
         raise MpmError(f"repetitions must be at least 1, not {repetitions}")
     sim = problem(dim, small=small)
@@ -67,7 +68,7 @@ def _timed(job: tuple[int, float, Any]) -> float:
 
 
 def together(dim: int, processes: int, seconds: float = 5.0) -> float:
-    """Particle-updates per second of several processes that run at the same time, summed."""
+    """Return the particle-updates per second of several processes that run at the same time, summed [1/s]."""
     context = multiprocessing.get_context("spawn")
     with context.Manager() as manager, context.Pool(processes) as pool:
         barrier = manager.Barrier(processes)

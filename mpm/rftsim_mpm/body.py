@@ -15,26 +15,27 @@ Array = NDArray[np.float64]
 
 @dataclasses.dataclass
 class Body:
-    """A shape with a motion. Infinite mass or inertia is prescribed motion, along each axis on its own.
+    """A shape with a motion, which infinite mass or inertia prescribes, along each axis on its own.
 
     In the plane, rotation is about y (into the page with x to the right and z up), so a positive spin rolls towards +x.
     """
 
     shape: Shape
+    """The body's surface, about the origin of its own frame."""
     position: Array
-    """Of the shape's origin, (dim,) [m]."""
+    """Place of the shape's origin, (dim,) [m]."""
     velocity: Array
-    """(dim,) [m/s]."""
+    """Velocity of the shape's origin, (dim,) [m/s]."""
     friction: float = 0.0
     """mu_surf between the surface and the sand [-]."""
     rotation: Array = dataclasses.field(default_factory=lambda: np.zeros(0))
-    """From the shape's frame to the world, (dim, dim); the identity if not given."""
+    """Rotation from the shape's frame to the world, (dim, dim); the identity if not given."""
     spin: Array = dataclasses.field(default_factory=lambda: np.zeros(0))
     """Angular velocity: (1,) about y in the plane, (3,) in space [rad/s]; zero if not given."""
     mass: Array | float = math.inf
-    """For each axis or for all [kg, in the plane kg/m]: carriages have different inertia along and across."""
+    """Mass for each axis or for all [kg, in the plane kg/m]: carriages have different inertia along and across."""
     inertia: Array | float = math.inf
-    """(3, 3) in the shape's frame in space, a number in the plane [kg m^2, in the plane kg m]."""
+    """Inertia, (3, 3) in the shape's frame in space, a number in the plane [kg m^2, in the plane kg m]."""
     load: Array | float = 0.0
     """External force, weight included, for each axis or for all [N, in the plane N/m]."""
     steer: Callable[[float], tuple[Array, Array]] | None = None
@@ -55,22 +56,22 @@ class Body:
 
     @property
     def vertices(self) -> Array:
-        """Corners in the world, (n, dim) [m]."""
+        """Corners of the shape in the world, shape (n, dim) [m]."""
         found: Array = self.position + self.shape.vertices @ self.rotation.T
         return found
 
     def to_world(self, points: Array) -> Array:
-        """Points of the shape's frame in the world."""
+        """Return points of the shape's frame in the world, shape (n, dim) [m]."""
         found: Array = self.position + points @ self.rotation.T
         return found
 
     def to_local(self, points: Array) -> Array:
-        """Points of the world in the shape's frame."""
+        """Return points of the world in the shape's frame, shape (n, dim) [m]."""
         found: Array = (points - self.position) @ self.rotation
         return found
 
     def advance(self, force: Array, moment: Array, time: float, dt: float) -> None:
-        """One step under the sand's force [N] and moment about the shape's origin [N m]: velocity first, then place."""
+        """Move by one step under the sand's force [N] and moment about the origin [N m]: velocity first, then place."""
         if self.steer is not None:
             self.velocity, self.spin = self.steer(time)
         else:
@@ -89,13 +90,13 @@ class Body:
 
 
 def plane_rotation(angle: float) -> Array:
-    """The rotation by an angle [rad] about y of places (x, z)."""
+    """Return the rotation by an angle [rad] about y of places (x, z), shape (2, 2)."""
     c, s = math.cos(angle), math.sin(angle)
     return np.array([[c, s], [-s, c]])
 
 
 def turned(rotation: Array, angle: Array) -> Array:
-    """A rotation, turned further by a rotation vector in the world, (1,) or (3,) [rad]: Rodrigues' formula."""
+    """Return a rotation turned further by a rotation vector in the world, (1,) or (3,) [rad]: Rodrigues' formula."""
     if angle.size == 1:
         return plane_rotation(float(angle[0])) @ rotation
     size = float(np.linalg.norm(angle))

@@ -29,24 +29,27 @@ from rftsim_mpm.wheel import Wheel
 
 Job = Plate | Push | Wheel
 KINDS: dict[str, type[Job]] = {"plates": Plate, "pushes": Push, "wheels": Wheel}
-"""By what they are called in files."""
+"""The kinds of jobs by their names in files."""
 
 DATA = Path(__file__).parent / "data"
 """Campaigns that are shipped: `plates`, `flat`, `solids`, `deep`, `rates` and `wheels`."""
 
 
 class Status(NamedTuple):
-    """Keys of a campaign's jobs, by what is on the disk."""
+    """Keys of a campaign's jobs, by what is on the disk of their results."""
 
     finished: list[str]
+    """Keys of the jobs whose result is there and whole."""
     missing: list[str]
+    """Keys of the jobs that have no result yet."""
     damaged: list[str]
+    """Keys of the jobs whose result is not as it was written."""
 
 
 def read_jobs(path: Path) -> list[Job]:
-    """What a TOML file asks for: each list under `[[plates]]`, `[[pushes]]` or `[[wheels]]` is an axis of a grid.
+    """Return the jobs of a TOML file: each list under `[[plates]]`, `[[pushes]]` or `[[wheels]]` is an axis of a grid.
 
-    `[defaults]` holds for all.
+    Settings under `[defaults]` hold for all.
 
     Raises:
         MpmError: The file is missing, is no TOML, names what a job does not have, or a job cannot be.
@@ -94,7 +97,7 @@ def _job(kind: type[Job], values: dict[str, Any], where: str) -> Job:
 
 
 def key(job: Job) -> str:
-    """Name of a job's result: the beginning of the hash of everything that defines it."""
+    """Return the name of a job's result: the beginning of the hash of everything that defines it."""
     return hashlib.sha256(_canonical(dataclasses.asdict(job)).encode()).hexdigest()[:16]
 
 
@@ -103,7 +106,7 @@ def _canonical(value: Any) -> str:
 
 
 def begin(folder: Path, jobs: list[Job]) -> None:
-    """Make a campaign's folder, or add jobs to one."""
+    """Make a campaign's folder, or add jobs to one that is there."""
     try:
         (folder / "results").mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -119,7 +122,7 @@ def begin(folder: Path, jobs: list[Job]) -> None:
 
 
 def manifest(folder: Path) -> list[Job]:
-    """The jobs that belong to a campaign."""
+    """Return the jobs that belong to a campaign, as its `manifest.json` has them."""
     path = folder / "manifest.json"
     try:
         text = json.loads(path.read_text())
@@ -136,17 +139,17 @@ def manifest(folder: Path) -> list[Job]:
 
 
 def status(folder: Path) -> Status:
-    """What is on the disk."""
+    """Return which jobs of a campaign have a result on the disk, and which of these are damaged."""
     found = Status([], [], [])
     for job in manifest(folder):
         name = key(job)
         path = folder / "results" / f"{name}.json"
-        (found.missing if not path.exists() else found.finished if whole(path, job) else found.damaged).append(name)
+        (found.missing if not path.exists() else found.finished if is_intact(path, job) else found.damaged).append(name)
     return found
 
 
-def whole(path: Path, job: Job) -> bool:
-    """Whether a result is what was written, and of this job."""
+def is_intact(path: Path, job: Job) -> bool:
+    """Whether a result is what was once written, and is of this job."""
     try:
         text = json.loads(path.read_text())
         checksum = text.pop("sha256")
@@ -160,7 +163,7 @@ def _name(job: Job) -> str:
 
 
 def results(folder: Path) -> list[dict[str, Any]]:
-    """Every finished result: `plate`, `push` or `wheel`, and what the command of that name reports of it."""
+    """Return every finished result: `plate`, `push` or `wheel`, and what the command of that name reports of it."""
     names = set(status(folder).finished)
     return [json.loads((folder / "results" / f"{name}.json").read_text()) for name in sorted(names)]
 
@@ -170,7 +173,7 @@ def _checksum(value: Any) -> str:
 
 
 def compute(job: Job, beat: Callable[[], None] | None = None) -> dict[str, Any]:
-    """One result; `beat` is called at every step."""
+    """Compute the result of one job; `beat` is called at every step."""
     watch = None if beat is None else lambda sim, share: beat()
     found: plate.PlateForce | push.PushForce | wheel.Rolling
     match job:
@@ -185,7 +188,7 @@ def compute(job: Job, beat: Callable[[], None] | None = None) -> dict[str, Any]:
 
 
 def write(folder: Path, name: str, result: dict[str, Any]) -> None:
-    """Put a result in its place, whole."""
+    """Put a result in its place in the campaign's folder, whole or not at all."""
     with replacing(folder / "results" / f"{name}.json") as temporary:
         temporary.write_text(json.dumps(result, indent=None) + "\n")
 
@@ -206,24 +209,20 @@ def run(folder: Path, processes: int, done: Callable[[str], None]) -> list[str]:
 
     Args:
         folder: The campaign.
-        processes: At a time.
+        processes: How many run at a time.
         done: Called with each key as its result appears.
 
     Returns:
-        What failed, one line for each job.
+        One line for each job that failed.
     """
     now = status(folder)
     waiting, failed = [*now.damaged, *now.missing], []
     running: dict[str, subprocess.Popen[str]] = {}
-    environment = os.environ | {"NUMBA_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
     try:
         while waiting or running:
             while waiting and len(running) < processes:
                 name = waiting.pop(0)
-                command = [sys.executable, "-m", "rftsim_mpm.worker", str(folder), name, str(os.getpid())]
-                running[name] = subprocess.Popen(
-                    command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, env=environment
-                )
+                running[name] = _worker(folder, name)
             time.sleep(0.1)
             for name in [name for name, process in running.items() if process.poll() is not None]:
                 process = running.pop(name)
@@ -240,8 +239,15 @@ def run(folder: Path, processes: int, done: Callable[[str], None]) -> list[str]:
     return failed
 
 
+def _worker(folder: Path, name: str) -> "subprocess.Popen[str]":
+    """Start the process of one job, with one thread."""
+    command = [sys.executable, "-m", "rftsim_mpm.worker", str(folder), name, str(os.getpid())]
+    environment = os.environ | {"NUMBA_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, env=environment)
+
+
 def run_on_ray(folder: Path, address: str | None, done: Callable[[str], None]) -> list[str]:
-    """As `run`, on the cores of a Ray cluster; `address` None starts one here."""
+    """Compute as `run` does, on the cores of a Ray cluster; `address` None starts one here."""
     try:
         import ray
     except ImportError as error:

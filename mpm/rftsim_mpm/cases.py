@@ -19,7 +19,7 @@ from rftsim_mpm.simulation import Simulation, Watch
 
 Array = NDArray[np.float64]
 GRAVITY = 9.8
-"""As in the source [m/s^2]."""
+"""Acceleration of gravity as in the source [m/s^2]."""
 
 
 def _whole_cells(size: tuple[float, float], dx: float) -> tuple[float, float]:
@@ -43,36 +43,42 @@ class CylinderDrag:
     """Case 1: a cylinder dragged at several depths (NDPM)."""
 
     depths: tuple[float, ...] = (0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0.07)
-    """Of the axis [m]."""
+    """Depths of the axis [m]."""
     diameter: float = 0.004
-    """[m]."""
+    """Diameter of the cylinder [m]."""
     cells: float = 5.0
     """Cells per diameter; the source has 8."""
     speed: float = 0.15
-    """[m/s]."""
+    """Speed of the cylinder [m/s]."""
     travel: float = 3.0
-    """[diameters]."""
+    """Length of the way [diameters]."""
     mu_int: float = 0.48
+    """Internal friction of the sand [-]."""
     mu_surf: float = 0.35
+    """Friction between sand and cylinder [-]."""
     rho: float = 1512.0
-    """[kg/m^3]."""
+    """Critical density of the sand [kg/m^3]."""
     width: float = 0.1
-    """Of the bed [m]; the source has 0.20 x 0.16."""
+    """Width of the bed [m]; the source has 0.20 x 0.16."""
 
 
 class CylinderForces(NamedTuple):
     """Drag and lift over pi (D/2)^2 rho g, the means of the last 40 % of the way."""
 
     depth: Array
+    """Depths of the axis, (n,) [m]."""
     drag: Array
+    """Force against the motion over pi (D/2)^2 rho g, (n,) [-]."""
     lift: Array
+    """Upward force over pi (D/2)^2 rho g, (n,) [-]."""
     r_squared: float
-    """Of a straight line through the drag."""
+    """Coefficient of determination of a straight line through the drag [-]."""
     frames: list[Frame]
+    """The sand at the end of each run."""
 
 
 def cylinder_drag(study: CylinderDrag, watch: Watch | None = None) -> CylinderForces:
-    """Run case 1."""
+    """Run case 1 of the source, the dragged cylinder."""
     if len(study.depths) < 3 or min(study.depths) < 1.5 * study.diameter:
         raise MpmError("case 1 needs three or more depths, each at least 1.5 diameters")
     dx = study.diameter / study.cells
@@ -100,27 +106,29 @@ class Plates:
     """Case 2: one plate of several lengths, and two side by side (NDPM)."""
 
     lengths: tuple[float, ...] = (0.05, 0.1, 0.15, 0.2, 0.25)
-    """Of single plates [m]."""
+    """Lengths of the single plates [m]."""
     gaps: tuple[float, ...] = (0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0, 2.0)
-    """Between two plates of `pair`, in their lengths [-]."""
+    """Gaps between two plates of `pair`, in their lengths [-]."""
     pair: float = 0.1
     """Length of each of two plates [m]."""
     depth: float = 0.08
-    """[m]."""
+    """How deep the plates are pushed [m]."""
     dx: float = 0.005
-    """[m]; the source has 0.00125."""
+    """Size of a cell [m]; the source has 0.00125."""
     speed: float = 0.2
-    """[m/s]; the source has 0.1."""
+    """Speed of the plates, downward [m/s]; the source has 0.1."""
     mu_int: float = 0.4
+    """Internal friction of the sand [-]."""
     mu_surf: float = 0.35
+    """Friction between sand and plates [-]."""
     rho: float = 1512.0
-    """[kg/m^3]."""
+    """Critical density of the sand [kg/m^3]."""
     bed: tuple[float, float] = (1.2, 0.6)
-    """[m]."""
+    """Width and depth of the bed [m]."""
 
 
 class PlatesForces(NamedTuple):
-    """What the plates of case 2 felt."""
+    """Forces on the plates of case 2, and the exponents that they grow with."""
 
     curves: list[tuple[Array, Array]]
     """Depth [m] and force [N/m] of each single plate."""
@@ -129,15 +137,17 @@ class PlatesForces(NamedTuple):
     deep: Array
     """Mean over the last quarter of the way [N/m]."""
     peak_exponent: float
-    """Of L."""
+    """Exponent of L that the first peak grows with [-]."""
     deep_exponent: float
+    """Exponent of L that the mean over the last quarter grows with [-]."""
     pair: Array
     """Mean force on each of two plates, over the last quarter, for each gap [N/m]."""
     frame: Frame
+    """The sand at the end, about the pair with the last gap."""
 
 
 def plates(study: Plates, watch: Watch | None = None) -> PlatesForces:
-    """Run case 2."""
+    """Run case 2 of the source, the plates pushed down."""
     if len(study.lengths) < 2:
         raise MpmError("case 2 needs two or more lengths for its exponents")
     count = len(study.lengths) + len(study.gaps)
@@ -158,6 +168,7 @@ def plates(study: Plates, watch: Watch | None = None) -> PlatesForces:
 
 
 def _push(study: Plates, offsets: list[float], length: float, watch: Watch | None) -> Track:
+    """Push plates of a length down side by side, their middles at offsets from the bed's [m]."""
     young = stiffness(study.rho, GRAVITY, study.depth, study.mu_int, 0.01)
     material = Material.of_density(study.mu_int, study.rho, young)
     size = _whole_cells(study.bed, study.dx)
@@ -175,35 +186,40 @@ class Plowing:
     packings: tuple[float, ...] = (0.57, 0.59, 0.61, 0.63)
     """Initial packing fractions [-]."""
     chi: float = 2.5
-    """2.5 in the source's text, 5.0 in its captions [-]."""
+    """Slope of friction against packing: 2.5 in the source's text, 5.0 in its captions [-]."""
     dx: float = 0.006
-    """[m]; the source has 0.004."""
+    """Size of a cell [m]; the source has 0.004."""
     bed: tuple[float, float] = (1.2, 0.2)
-    """[m]; the source has 2.4 x 0.4."""
+    """Width and depth of the bed [m]; the source has 2.4 x 0.4."""
     depth: float = 0.05
-    """Of the plate's lower edge [m]."""
+    """Depth of the plate's lower edge [m]."""
     travel: float = 0.5
-    """[m]."""
+    """Length of the way [m]."""
     speed: float = 0.2
-    """[m/s]."""
+    """Speed of the plate [m/s]."""
     mu_int: float = 0.4
+    """Internal friction of the sand at the critical packing [-]."""
     mu_surf: float = 0.35
+    """Friction between sand and plate [-]."""
 
 
 class PlowingForces(NamedTuple):
     """Drag against travel, and how it fluctuates."""
 
     travel: Array
+    """Distance moved, (n,) [m]."""
     drag: list[Array]
-    """Of each packing [N/m]."""
+    """Force against the motion for each packing, (n,) each [N/m]."""
     mean: Array
+    """Mean drag over the last half of the way, for each packing [N/m]."""
     fluctuation: Array
     """Standard deviation about a smooth trend over the last half, after averaging over a cell, relative [-]."""
     frames: list[Frame]
+    """The sand at the end, for each packing."""
 
 
 def plowing(study: Plowing, watch: Watch | None = None) -> PlowingForces:
-    """Run case 3."""
+    """Run case 3 of the source, the plowing plate."""
     drags, frames, means, sizes = [], [], [], []
     travel = np.zeros(0)
     for i, phi in enumerate(study.packings):
@@ -233,35 +249,40 @@ class ShearZone:
     phi: float = 0.55
     """Initial packing fraction [-]."""
     dx: float = 0.002
-    """[m]; the source has 0.0005."""
+    """Size of a cell [m]; the source has 0.0005."""
     bed: tuple[float, float] = (0.5, 0.2)
-    """[m]."""
+    """Width and depth of the bed [m]."""
     depth: float = 0.04
-    """[m]."""
+    """How deep the plate is pushed [m]."""
     speed: float = 0.15
-    """[m/s]."""
+    """Speed of the plate, downward [m/s]."""
     mu_int: float = 0.53
+    """Internal friction of the sand at the critical packing [-]."""
     mu_surf: float = 0.35
+    """Friction between sand and plate [-]."""
     chi: float = 5.0
+    """Slope of friction and dilatancy against packing fraction [-]."""
     phi_c: float = 0.60
+    """Critical packing fraction [-]."""
     rho_g: float = 1100.0
-    """[kg/m^3]."""
+    """Density of the grains [kg/m^3]."""
 
 
 class Wedge(NamedTuple):
     """The sand that moves with the plate, at several moments."""
 
     time: Array
-    """In plate lengths travelled, t v / L [-]."""
+    """Time of each moment in plate lengths travelled, t v / L [-]."""
     height: Array
-    """Below the plate, in plate lengths [-]."""
+    """Height of the sand below the plate that moves with it, in plate lengths [-]."""
     bluntness: Array
     """Width half way down over width at the plate: one for a rectangle, a half for a triangle."""
     track: Track
+    """The whole run, with a frame for each moment."""
 
 
 def shear_zone(study: ShearZone, watch: Watch | None = None) -> Wedge:
-    """Run case 4."""
+    """Run case 4 of the source, the wedge under a plate."""
     young = stiffness(study.phi_c * study.rho_g, GRAVITY, study.depth, study.mu_int, 0.01)
     material = Material(study.mu_int, rho_g=study.rho_g, phi_c=study.phi_c, chi=study.chi, young=young)
     size = _whole_cells(study.bed, study.dx)

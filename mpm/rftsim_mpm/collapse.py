@@ -21,16 +21,16 @@ from rftsim_mpm.simulation import Simulation, Watch
 
 @dataclasses.dataclass(frozen=True)
 class Collapse:
-    """Half a column: its middle is a mirror."""
+    """Columns of several aspect ratios, of each the half beside its middle, which is a mirror."""
 
     aspects: tuple[float, ...] = (0.5, 0.75, 1.0, 1.5, 4.0, 6.0, 9.0)
     """Heights over half widths [-]."""
     half_width: float = 0.05
-    """[m]."""
+    """Half of the column's width at the start, L0 [m]."""
     mu_int: float = 0.4
-    """Internal friction [-]."""
+    """Internal friction of the sand, and of the floor [-]."""
     rho: float = 1500.0
-    """[kg/m^3]."""
+    """Critical density of the sand [kg/m^3]."""
     cells: int = 16
     """Cells in the half width."""
 
@@ -44,12 +44,14 @@ class Collapse:
 
 
 class Runout(NamedTuple):
-    """One column."""
+    """How far one column ran out, and the sand at the end."""
 
     aspect: float
+    """Height over half width at the start, in whole cells [-]."""
     runout: float
-    """(L - L0)/L0 [-]; L holds 99 % of the sand that is not in the air."""
+    """Run-out (L - L0)/L0 [-]; L holds 99 % of the sand that is not in the air."""
     frame: Frame
+    """The sand at the end."""
 
 
 def fall(study: Collapse, aspect: float, watch: Watch | None = None) -> Runout:
@@ -68,5 +70,5 @@ def fall(study: Collapse, aspect: float, watch: Watch | None = None) -> Runout:
 
 
 def exponent(aspects: NDArray[np.float64], runouts: NDArray[np.float64]) -> float:
-    """Slope of ln(run-out) against ln(aspect)."""
+    """Return the slope of ln(run-out) against ln(aspect) by least squares [-]."""
     return float(np.polyfit(np.log(aspects), np.log(runouts), 1)[0])

@@ -1,10 +1,10 @@
-"""What compiled code is cached under."""
+"""How the loops are compiled, and the name that their machine code is cached under."""
 
 import hashlib
 from pathlib import Path
 from typing import Final
 
-SOURCE: Final = hashlib.sha256(
+SOURCE_HASH: Final = hashlib.sha256(
     b"".join(
         path.read_bytes() for path in sorted(Path(__file__).parent.glob("*.py")) if b"from numba" in path.read_bytes()
     )

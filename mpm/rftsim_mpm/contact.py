@@ -11,22 +11,106 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from rftsim_mpm.compiled import SOURCE
+from rftsim_mpm.compiled import SOURCE_HASH
 from rftsim_mpm.lanes import four, lane, load, store
 from rftsim_mpm.transfer import MOMENTUM, OPTIONS, pick, spline
 from rftsim_mpm.walls import mirrored
 
-FULL = 0.5
+ONSET = 0.5
 """Filling at which contact begins: that of a point on the surface of a level bed."""
 RAMP = 0.1
 """Further filling over which the layer gains its stiffness."""
 
 
 def make_contact(dim: int) -> Any:
-    """The contact loop of two or three dimensions."""
-    DIM, source = dim, SOURCE  # noqa: N806
+    """Return the compiled contact loop of two or three dimensions."""
+    DIM, source = dim, SOURCE_HASH  # noqa: N806
     last = dim - 1
     count = 3**dim
+
+    @njit(inline="always")
+    def put(points, q, centre, rotation, low, inv_dx, shape, place):
+        """Fill a point's place in the world; return whether the grid reaches round it, and whether a wall is near."""
+        inside, beside = True, False
+        for a in range(DIM):
+            place[q, a] = centre[a]
+            for b in range(DIM):
+                place[q, a] += rotation[a, b] * points[q, b]
+            g = (place[q, a] - low[a]) * inv_dx
+            inside = inside and g >= 0.0 and g <= shape[a] - 3
+            beside = beside or g < 2.5 or g > shape[a] - 5.5
+        return inside, beside
+
+    @njit(inline="always")
+    def planes(shape, at):
+        """Return a factor 2 for each wall in whose plane a node lies, where it has half of the mirrored bed's mass."""
+        share = 1.0
+        for d in range(DIM):
+            share *= 2.0 if at[d] == 1 or at[d] == shape[d] - 2 else 1.0
+        return share
+
+    @njit(inline="always")
+    def with_images(grid, shape, at, found, seen):
+        """Return mass and momentum of a node beside walls and of its images behind them, summed."""
+        seen[:] = 0.0
+        for image in range(mirrored(shape, at, found)):
+            node = found[image, 0]
+            seen[0, 0] += grid[node, 0]
+            for d in range(DIM):
+                if at[d] != 1 and at[d] != shape[d] - 2:
+                    seen[0, 1 + d] += found[image, 1 + d] * grid[node, MOMENTUM + d]
+        return load(seen, 0, 0)
+
+    @njit(inline="always")
+    def slide(place, q, centre, velocity, spin, seen, total, slip):
+        """Fill the sand's velocity less that of the body at a point, in the world."""
+        for a in range(DIM):
+            slip[a] = seen[0, 1 + a] / total - velocity[a]
+        if DIM == 2:
+            slip[0] -= spin[0] * (place[q, 1] - centre[1])
+            slip[1] += spin[0] * (place[q, 0] - centre[0])
+        else:
+            rx, ry, rz = place[q, 0] - centre[0], place[q, 1] - centre[1], place[q, last] - centre[last]
+            slip[0] -= spin[1] * rz - spin[2] * ry
+            slip[1] -= spin[2] * rx - spin[0] * rz
+            slip[last] -= spin[0] * ry - spin[1] * rx
+
+    @njit(inline="always")
+    def press(slip, rotation, q, normals, stiffness, mu, local, t, traction):
+        """Let a point's traction follow the slip, at most mu times the pressure across; none where it would pull.
+
+        Returns:
+            Whether the point presses.
+        """
+        normal = 0.0
+        for a in range(DIM):
+            local[a] = 0.0
+            for b in range(DIM):
+                local[a] += rotation[b, a] * slip[b]
+            t[a] = traction[q, a] - stiffness * local[a]
+            normal += t[a] * normals[q, a]
+        if normal <= 0.0:
+            traction[q, :] = 0.0
+            return False
+        across = 0.0
+        for a in range(DIM):
+            t[a] -= normal * normals[q, a]
+            across += t[a] * t[a]
+        across = np.sqrt(across)
+        share = mu * normal / across if across > mu * normal else 1.0
+        for a in range(DIM):
+            traction[q, a] = share * t[a] + normal * normals[q, a]
+        return True
+
+    @njit(inline="always")
+    def give(grid, rotation, q, areas, traction, total, weight, rows, push):
+        """Fill the force of a point on the sand, in the world, and share it out among the nodes about it."""
+        for a in range(DIM):
+            for b in range(DIM):
+                push[q, a] += rotation[a, b] * areas[q] * traction[q, b]
+        per_mass = (1.0 / total) * four(0.0, push[q, 0], push[q, 1], push[q, last] if DIM == 3 else 0.0)
+        for n in range(count):
+            store(grid, rows[n], 4, load(grid, rows[n], 4) + weight[n] * per_mass)
 
     @njit(**OPTIONS)
     def touch(grid, low, inv_dx, shape, full, motion, points, normals, areas, stiffness, mu, traction, place, push):
@@ -39,12 +123,12 @@ def make_contact(dim: int) -> Any:
             shape: Nodes along each axis.
             full: Mass of a full cell.
             motion: Place of the body's frame [m], its rotation to the world, velocity and spin.
-            points: Of the surface, in the body's frame, (n, dim) [m].
-            normals: Outward, (n, dim).
-            areas: (n,).
-            stiffness: Of the layer, times the time step [Pa s/m].
-            mu: Friction.
-            traction: Of the body on the sand, in the body's frame, (n, dim) [Pa]; updated.
+            points: Points of the surface, in the body's frame, (n, dim) [m].
+            normals: Outward unit normals there, (n, dim).
+            areas: Area that each point stands for, (n,) [m^2, in the plane m].
+            stiffness: Stiffness of the layer, times the time step [Pa s/m].
+            mu: Friction between body and sand [-].
+            traction: Stress of the body on the sand, in the body's frame, (n, dim) [Pa]; updated.
             place: Filled: the points in the world, (n, dim) [m].
             push: Filled: the forces on the sand, (n, dim) [N].
         """
@@ -55,17 +139,9 @@ def make_contact(dim: int) -> Any:
         seen = np.zeros((1, 4))  # mass and momentum
         slip, local, t, at = np.zeros(DIM), np.zeros(DIM), np.zeros(DIM), np.zeros(DIM, np.int64)
         found = np.ones((1 << DIM, 1 + DIM), np.int64)
+        push[:] = 0.0
         for q in range(points.shape[0]):
-            inside = True
-            beside = False
-            for a in range(DIM):
-                push[q, a] = 0.0
-                place[q, a] = centre[a]
-                for b in range(DIM):
-                    place[q, a] += rotation[a, b] * points[q, b]
-                g = (place[q, a] - low[a]) * inv_dx
-                inside = inside and g >= 0.0 and g <= shape[a] - 3
-                beside = beside or g < 2.5 or g > shape[a] - 5.5
+            inside, beside = put(points, q, centre, rotation, low, inv_dx, shape, place)
             if not inside:
                 traction[q, :] = 0.0
                 continue
@@ -81,64 +157,20 @@ def make_contact(dim: int) -> Any:
                     wab = pick(wx, a) * (pick(wy, b) if DIM == 3 else 1.0)
                     for c in range(3):
                         w = wab * pick(wz, c)
-                        if beside:
-                            at[0], at[last] = i + a, k + c
-                            if DIM == 3:
-                                at[1] = j + b
-                            for d in range(DIM):  # a node in a wall's plane has half of the mirrored bed's mass
-                                w *= 2.0 if at[d] == 1 or at[d] == shape[d] - 2 else 1.0
-                            seen[:] = 0.0
-                            for image in range(mirrored(shape, at, found)):
-                                node = found[image, 0]
-                                seen[0, 0] += grid[node, 0]
-                                for d in range(DIM):
-                                    if at[d] != 1 and at[d] != shape[d] - 2:
-                                        seen[0, 1 + d] += found[image, 1 + d] * grid[node, MOMENTUM + d]
-                            sand = load(seen, 0, 0)
-                        else:
-                            sand = load(grid, row + c, 0)
+                        at[0], at[1], at[last] = i + a, j + b, k + c  # in the plane, z overwrites y
+                        w *= planes(shape, at) if beside else 1.0
+                        sand = with_images(grid, shape, at, found, seen) if beside else load(grid, row + c, 0)
                         mean += w * sand
                         weight[n], rows[n] = w * lane(sand, 0), row + c
                         n += 1
             total = lane(mean, 0)
-            ramp = min(1.0, (total / full - FULL) / RAMP)
+            ramp = min(1.0, (total / full - ONSET) / RAMP)
             if ramp <= 0.0:
                 traction[q, :] = 0.0
                 continue
             store(seen, 0, 0, mean)
-            for a in range(DIM):
-                slip[a] = seen[0, 1 + a] / total - velocity[a]
-            if DIM == 2:
-                slip[0] -= spin[0] * (place[q, 1] - centre[1])
-                slip[1] += spin[0] * (place[q, 0] - centre[0])
-            else:
-                rx, ry, rz = place[q, 0] - centre[0], place[q, 1] - centre[1], place[q, last] - centre[last]
-                slip[0] -= spin[1] * rz - spin[2] * ry
-                slip[1] -= spin[2] * rx - spin[0] * rz
-                slip[last] -= spin[0] * ry - spin[1] * rx
-            normal = 0.0
-            for a in range(DIM):
-                local[a] = 0.0
-                for b in range(DIM):
-                    local[a] += rotation[b, a] * slip[b]
-                t[a] = traction[q, a] - ramp * stiffness * local[a]
-                normal += t[a] * normals[q, a]
-            if normal <= 0.0:
-                traction[q, :] = 0.0
-                continue
-            across = 0.0
-            for a in range(DIM):
-                t[a] -= normal * normals[q, a]
-                across += t[a] * t[a]
-            across = np.sqrt(across)
-            share = mu * normal / across if across > mu * normal else 1.0
-            for a in range(DIM):
-                traction[q, a] = share * t[a] + normal * normals[q, a]
-            for a in range(DIM):
-                for b in range(DIM):
-                    push[q, a] += rotation[a, b] * areas[q] * traction[q, b]
-            per_mass = (1.0 / total) * four(0.0, push[q, 0], push[q, 1], push[q, last] if DIM == 3 else 0.0)
-            for m in range(count):
-                store(grid, rows[m], 4, load(grid, rows[m], 4) + weight[m] * per_mass)
+            slide(place, q, centre, velocity, spin, seen, total, slip)
+            if press(slip, rotation, q, normals, ramp * stiffness, mu, local, t, traction):
+                give(grid, rotation, q, areas, traction, total, weight, rows, push)
 
     return touch

@@ -20,21 +20,22 @@ Array = NDArray[np.float64]
 
 @dataclasses.dataclass(frozen=True)
 class Course:
-    """What moves where."""
+    """A body, its straight way through a level bed, and the cells that it is computed with."""
 
     shape: Shape
+    """The body's surface, about the origin of its own frame."""
     rotation: Array
-    """From the shape's frame to the world, (dim, dim)."""
+    """Rotation from the shape's frame to the world, (dim, dim)."""
     direction: Array
-    """Of the motion, (dim,); without a component along y."""
+    """Unit vector along which the body moves, (dim,); without a component along y."""
     speed: float
-    """[m/s]."""
+    """Speed of the body [m/s]."""
     friction: float
-    """Between sand and body [-]."""
+    """Friction between sand and body [-]."""
     material: Material
-    """The sand."""
+    """Parameters of the sand."""
     depth: float
-    """Of the shape's origin at the reading [m]."""
+    """Depth of the shape's origin at the reading [m]."""
     approach: float
     """Travel before the reading [m]."""
     window: float
@@ -58,11 +59,11 @@ class Course:
 
     @property
     def level(self) -> float:
-        """Height of the sand's surface at rest [m]."""
+        """Height of the sand's surface at rest, above the floor [m]."""
         return math.ceil(self.bed / self.dx) * self.dx
 
     def prepare(self) -> Simulation:
-        """The bed with the body at its start."""
+        """Return the bed with the body at the start of its way."""
         dx, dim = self.dx, self.shape.dim
         reach = np.abs(self.shape.vertices @ self.rotation.T).max(axis=0)
         beside = [math.ceil((self.margin + r) / dx) for r in reach[: dim - 1]]  # cells from the body's middle to a wall
@@ -91,7 +92,7 @@ class Course:
             watch: Called after each step with the simulation and the share of the way that is done.
         """
         sim = self.prepare()
-        whole = 2 ** sum(self.mirrors)
+        copies = 2 ** sum(self.mirrors)  # of the part that is modelled, in the whole body
         first = sim.bodies[0].position.copy()
         log, traction, steps = Log(), np.zeros_like(sim.traction[0]), 0
         began, travel = time.perf_counter(), 0.0
@@ -99,7 +100,7 @@ class Course:
             sim.step()
             travel = float((sim.bodies[0].position - first) @ self.direction)
             depth = self.depth - (travel - self.approach) * float(self.direction[-1])
-            log.add(sim.time, travel, depth, whole * sim.force[0], whole * sim.moment[0])
+            log.add(sim.time, travel, depth, copies * sim.force[0], copies * sim.moment[0])
             if abs(travel - self.approach) <= self.window:
                 traction += sim.traction[0]
                 steps += 1
@@ -113,24 +114,23 @@ class Course:
         force, noise = read(history, self.approach, self.window)
         near = np.abs(history.travel - self.approach) <= self.window
         seconds = time.perf_counter() - began
-        return Passage(sim, history, force, history.moment[near].mean(axis=0), noise, traction / steps, whole, seconds)
+        return Passage(sim, history, force, history.moment[near].mean(axis=0), noise, traction / steps, seconds)
 
 
 class Passage(NamedTuple):
-    """What a body felt on its way."""
+    """Force and moment on a body along its way and at the reading, and the simulation at the end."""
 
     sim: Simulation
-    """As it was at the end."""
+    """The simulation as it was at the end."""
     history: History
+    """Averages along the way."""
     force: Array
-    """Of the sand on the body at the reading, (dim,) [N, in the plane N/m]."""
+    """Force of the sand on the body at the reading, (dim,) [N, in the plane N/m]."""
     moment: Array
-    """About the shape's origin, (1,) or (3,) [N m]."""
+    """Moment about the shape's origin, mean while reading, (1,) or (3,) [N m, in the plane N]."""
     noise: float
-    """Of averages over 0.5 ms, relative [-]."""
+    """Noise of averages over 0.5 ms, relative [-]."""
     traction: Array
-    """Mean while reading, as `Simulation.traction` has it."""
-    whole: int
-    """How many times what was modelled the body is."""
+    """Mean traction while reading, as `Simulation.traction` has it."""
     seconds: float
-    """Of computing."""
+    """Time that the computation took [s]."""

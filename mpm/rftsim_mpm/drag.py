@@ -19,7 +19,10 @@ Array = NDArray[np.float64]
 
 @dataclasses.dataclass(frozen=True)
 class Drag:
-    """Plates of [Agarwal] Fig. 4-8; the internal friction is not given there."""
+    """Upright plates at several depths and speeds, by default those of [Agarwal] Fig. 4-8.
+
+    The source does not give the internal friction there.
+    """
 
     length: float = 0.016
     """Height of the plate [m]."""
@@ -30,16 +33,16 @@ class Drag:
     mu_surf: float = 0.35
     """Friction between sand and plate [-]."""
     depths: tuple[float, ...] = (0.02, 0.03, 0.04)
-    """Of the plate's centre [m]."""
+    """Depths of the plate's centre [m]."""
     speeds: tuple[float, ...] = (0.1, 0.32, 0.64)
-    """[m/s]."""
+    """Speeds of the plate [m/s]."""
     travel: float = 2.5
-    """Before the reading [plate lengths]; a fast plate then heaps up sand ahead, and feels more and more."""
+    """Travel before the reading [plate lengths]; a fast plate then heaps up sand ahead, and feels more and more."""
     cells: float = 10.0
     """Cells per plate length."""
 
     def plates(self) -> list[Plate]:
-        """One plate for each depth and speed."""
+        """Return one plate for each depth and speed."""
         if len(set(self.depths)) < 2 or len(set(self.speeds)) < 2:
             raise MpmError("drag needs at least two depths and two speeds to fit K and lambda")
         return [
@@ -65,18 +68,19 @@ class DragForces(NamedTuple):
     """Drag of each plate and what it amounts to."""
 
     depth: Array
-    """(n,) [m]."""
+    """Depth of each plate's centre, (n,) [m]."""
     speed: Array
-    """(n,) [m/s]."""
+    """Speed of each plate, (n,) [m/s]."""
     drag: Array
-    """(n,) [N/m]."""
+    """Force against the motion, (n,) [N/m]."""
     lift: Array
-    """(n,) [N/m]."""
+    """Upward force, (n,) [N/m]."""
     stiffness: float
     """K of F = K z + lambda rho L v^2, by least squares [N/m^2]."""
     inertia: float
-    """lambda [-]."""
+    """lambda of the same fit [-]."""
     runs: list[PlateForce]
+    """The measurement on each plate."""
 
 
 def drag(study: Drag, watch: Watch | None = None) -> DragForces:

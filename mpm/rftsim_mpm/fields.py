@@ -13,47 +13,68 @@ Array = NDArray[np.float64]
 
 
 class Frame(NamedTuple):
-    """One moment: the particles (of the slice through the first body, in three dimensions) and the bodies."""
+    """One moment: the particles (in three dimensions those of the slice through the first body) and the bodies."""
 
     time: float
+    """Simulated time [s]."""
     place: Array
-    """Of each particle, (n, 2): x and z [m]."""
+    """Places of the particles, (n, 2): x and z [m]."""
     spacing: float
     """Mean distance between particles [m]."""
     strain: Array
     """Equivalent plastic shear strain, (n,) [-]."""
     rate: Array
-    """Its rate, as a mean since the frame before, (n,) [1/s]."""
+    """Rate of the equivalent plastic shear strain, as a mean since the frame before, (n,) [1/s]."""
     pressure: Array
-    """(n,) [Pa]."""
+    """Mean of the three normal stresses, compression positive, (n,) [Pa]."""
     packing: Array
     """Packing fraction, (n,) [-]."""
     velocity: Array
-    """(n, dim) [m/s]."""
+    """Velocities of the particles, (n, dim) [m/s]."""
     surface: Array
     """Free surface: the top of the highest particle in each column of cells, (m, 2) [m]."""
     outlines: list[Array]
     """Each body's outline or, in three dimensions, the hull of its side view, (k, 2) [m]."""
 
 
+class StrainRate:
+    """The rate of plastic strain since it was last asked for, at first since time zero."""
+
+    def __init__(self) -> None:
+        self._time = 0.0
+        self._strain = np.zeros(0)
+
+    def since_last(self, sim: Simulation) -> Array:
+        """Return each particle's mean rate of equivalent plastic shear strain, shape (n,) [1/s]."""
+        p = sim.particles
+        if not self._strain.size:
+            self._strain = np.zeros(int(p.number.max()) + 1)
+        rate: Array = (p.strain - self._strain[p.number]) / max(sim.time - self._time, sim.dt)
+        self._strain[p.number], self._time = p.strain, sim.time
+        return rate
+
+
+def in_slice(sim: Simulation) -> NDArray[np.bool_]:
+    """Whether each particle lies in the slice a cell thick through the first body; all do in the plane, shape (n,)."""
+    p = sim.particles
+    if p.dim == 2:
+        return np.ones(len(p), bool)
+    middle = sim.bodies[0].position[1] if sim.bodies else 0.5 * sim.size[1]
+    found: NDArray[np.bool_] = np.abs(p.x[:, 1] - middle) <= 0.51 * sim.dx
+    return found
+
+
 class Camera:
     """Takes frames of a simulation; remembers the strain at the last one, for its rate."""
 
     def __init__(self, sim: Simulation) -> None:
-        self._time = sim.time
-        self._strain = np.zeros(int(sim.particles.number.max()) + 1)
-        self._strain[sim.particles.number] = sim.particles.strain
+        self._rate = StrainRate()
+        self._rate.since_last(sim)
 
     def shoot(self, sim: Simulation) -> Frame:
-        """A frame of the present moment."""
-        p = sim.particles
-        rate = (p.strain - self._strain[p.number]) / max(sim.time - self._time, sim.dt)
-        self._time = sim.time
-        self._strain[p.number] = p.strain
-        seen = np.ones(len(p), bool)
-        if p.dim == 3:
-            middle = sim.bodies[0].position[1] if sim.bodies else 0.5 * sim.size[1]
-            seen = np.abs(p.x[:, 1] - middle) <= 0.51 * sim.dx
+        """Return a frame of the present moment, and remember its strain."""
+        p, seen = sim.particles, in_slice(sim)
+        rate = self._rate.since_last(sim)
         size = p.volume[seen] ** (1.0 / p.dim)
         return Frame(
             time=sim.time,
@@ -75,7 +96,7 @@ def _outline(body: Body) -> Array:
 
 
 def free_surface(place: Array, size: Array, dx: float) -> Array:
-    """Height of the sand in each column of cells that has any, (m, 2): half a particle above the highest centre.
+    """Return the top of the sand in each column of cells that has any, (m, 2): half a particle above a centre.
 
     What lies above a gap of more than two cells is in the air and is not counted, unless it is thicker than the gap:
     then a body is below it.

@@ -14,36 +14,36 @@ Array = NDArray[np.float64]
 
 
 def part(watch: Watch | None, index: int, count: int) -> Watch | None:
-    """A watch of one run out of several."""
+    """Return a watch of one run out of several, which tells `watch` the share of all that is done."""
     return None if watch is None else lambda sim, share: watch(sim, (index + share) / count)
 
 
 class Track(NamedTuple):
-    """Averages over AVERAGE."""
+    """Averages over AVERAGE of the bodies' places, velocities and forces, and frames of the sand."""
 
     time: Array
-    """(n,) [s]."""
+    """End of each average, (n,) [s]."""
     position: Array
-    """Of each body, (n, nbody, dim) [m]."""
+    """Place of each body, (n, nbody, dim) [m]."""
     velocity: Array
-    """(n, nbody, dim) [m/s]."""
+    """Velocity of each body, (n, nbody, dim) [m/s]."""
     force: Array
-    """Of the sand on each, (n, nbody, dim) [N, in the plane N/m]."""
+    """Force of the sand on each body, (n, nbody, dim) [N, in the plane N/m]."""
     frames: list[Frame]
-    """At the times asked for, and at the end."""
+    """Frames at the times asked for, and at the end."""
 
     def after(self, time: float) -> "Track":
-        """The part from a time [s] on."""
+        """Return the part of the track from a time [s] on, with all frames."""
         keep = self.time >= time
         return Track(self.time[keep], self.position[keep], self.velocity[keep], self.force[keep], self.frames)
 
 
 def follow(sim: Simulation, duration: float, watch: Watch | None = None, shots: Sequence[float] = ()) -> Track:
-    """Run to a time [s].
+    """Run a simulation to a time and return what its bodies did.
 
     Args:
         sim: Stepped in place.
-        duration: [s].
+        duration: Simulated time to run to [s].
         watch: Called after each step with the simulation and the share that is done.
         shots: When to take frames [s]; rates in them are means over the 2 % of the run before.
     """
@@ -51,15 +51,15 @@ def follow(sim: Simulation, duration: float, watch: Watch | None = None, shots: 
     cameras: list[Camera | None] = [None] * len(due)
     frames: list[Frame] = []
     rows: list[Array] = []
-    open_: list[Array] = []
+    pending: list[Array] = []
     until = AVERAGE
     while sim.time < duration:
         sim.step()
         moved = [part for body in sim.bodies for part in (body.position, body.velocity)]
-        open_.append(np.concatenate([sim.force.ravel(), *moved]))
+        pending.append(np.concatenate([sim.force.ravel(), *moved]))
         if sim.time >= until:
-            rows.append(np.concatenate([[sim.time], np.mean(open_, axis=0)]))
-            open_.clear()
+            rows.append(np.concatenate([[sim.time], np.mean(pending, axis=0)]))
+            pending.clear()
             until = sim.time + AVERAGE
         for i, time in enumerate(due):
             if cameras[i] is None and sim.time >= time - 0.02 * duration:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from rftsim_mpm.body import turned
 from rftsim_mpm.errors import MpmError
 from rftsim_mpm.shapes import Shape, box, mesh
+from rftsim_mpm.silhouette import read_mesh
 
 Array = NDArray[np.float64]
 
@@ -55,23 +56,24 @@ def _prism(side: float, width: float, name: str) -> Shape:
     return _hull(np.array([(x, y * width, z) for x, z in corners for y in (-0.5, 0.5)]), name)
 
 
-AXES = (0.075, 0.045, 0.045)
+SEMI_AXES = (0.075, 0.045, 0.045)
+"""Half the ellipsoid's extent along x, y and z [m]."""
 INTRUDERS: dict[str, Callable[[], Shape]] = {
     "sphere": lambda: _ellipsoid((0.05, 0.05, 0.05), "sphere"),
-    "ellipsoid": lambda: _ellipsoid(AXES, "ellipsoid"),
+    "ellipsoid": lambda: _ellipsoid(SEMI_AXES, "ellipsoid"),
     "cube-edge-on": lambda: _cube(0.0, math.pi / 4, "cube-edge-on"),
     "cube-60-45": lambda: _cube(math.pi / 3, math.pi / 4, "cube-60-45"),
     "cube-30-60": lambda: _cube(math.pi / 6, math.pi / 3, "cube-30-60"),
     "prism-wide": lambda: _prism(0.075, 0.105, "prism-wide"),
-    "quarter-ellipsoid": lambda: _ellipsoid(AXES, "quarter-ellipsoid", (True, True)),
+    "quarter-ellipsoid": lambda: _ellipsoid(SEMI_AXES, "quarter-ellipsoid", (True, True)),
     "prism-tall": lambda: _prism(0.105, 0.075, "prism-tall"),
-    "half-ellipsoid": lambda: _ellipsoid(AXES, "half-ellipsoid", (False, True)),
+    "half-ellipsoid": lambda: _ellipsoid(SEMI_AXES, "half-ellipsoid", (False, True)),
 }
-"""In the source's order."""
+"""The solids by name, in the source's order."""
 
 
 def intruder(name: str) -> Shape:
-    """One of INTRUDERS, or a closed mesh from a file [m], about its centroid.
+    """Return one of INTRUDERS, or a closed mesh from a file [m], about its centroid.
 
     Raises:
         MpmError: There is none of that name, and no such file; or the mesh is not closed.
@@ -80,12 +82,7 @@ def intruder(name: str) -> Shape:
         return INTRUDERS[name]()
     if not Path(name).suffix:
         raise MpmError(f"there is no intruder {name!r}: take {', '.join(INTRUDERS)}, or a mesh's file")
-    import trimesh
-
-    try:
-        body = trimesh.load(name, force="mesh")
-    except (OSError, ValueError) as error:
-        raise MpmError(f"cannot read the mesh {name}: {error}") from error
+    body = read_mesh(Path(name))
     solid = mesh(np.array(body.vertices), np.array(body.faces), Path(name).name)
     return Shape(solid.name, solid.vertices - body.center_mass, solid.faces)
 

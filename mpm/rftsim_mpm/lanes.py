@@ -18,7 +18,7 @@ from numba.extending import intrinsic, lower_builtin, models, register_model, ty
 
 _VECTOR = ir.VectorType(ir.DoubleType(), 4)
 _ALIGNMENT = 8
-"""Bytes: all that is known of where a row begins."""
+"""Alignment that is known of where a row begins [bytes]."""
 
 
 class Four(types.Type):
@@ -49,7 +49,7 @@ def _built(builder: Any, values: Any) -> Any:
 
 
 def _pointer(context: Any, builder: Any, kind: Any, array: Any, row: Any, column: Any) -> Any:
-    """Of array[row, column], without a look at bounds or signs."""
+    """Pointer to array[row, column], without a look at bounds or signs."""
     found = cgutils.get_item_pointer(
         context, builder, kind, context.make_array(kind)(context, builder, array), (row, column), wraparound=False
     )
@@ -58,7 +58,7 @@ def _pointer(context: Any, builder: Any, kind: Any, array: Any, row: Any, column
 
 @intrinsic
 def four(typing, a, b, c, d):
-    """Four numbers as one."""
+    """Join four numbers into one value of type Four."""
 
     def generate(context, builder, signature, arguments):
         return _built(builder, arguments)
@@ -68,7 +68,7 @@ def four(typing, a, b, c, d):
 
 @intrinsic
 def lane(typing, vector, i):
-    """One of the four, which it is known when compiled."""
+    """Return one of the four numbers; which one must be known when compiled."""
     if not isinstance(i, types.IntegerLiteral):
         return None
 
@@ -80,7 +80,7 @@ def lane(typing, vector, i):
 
 @intrinsic
 def load(typing, array, row, column):
-    """array[row, column : column + 4]; neither index may be negative."""
+    """Return array[row, column : column + 4] as one value; neither index may be negative."""
 
     def generate(context, builder, signature, arguments):
         return builder.load(_pointer(context, builder, array, *arguments), align=_ALIGNMENT)
@@ -90,7 +90,7 @@ def load(typing, array, row, column):
 
 @intrinsic
 def store(typing, array, row, column, vector):
-    """array[row, column : column + 4] = vector."""
+    """Set array[row, column : column + 4] to the four numbers of a value; neither index may be negative."""
 
     def generate(context, builder, signature, arguments):
         builder.store(arguments[3], _pointer(context, builder, array, *arguments[:3]), align=_ALIGNMENT)

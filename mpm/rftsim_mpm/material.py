@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 
 from rftsim_mpm.compiled import FASTMATH
-from rftsim_mpm.errors import MpmError
+from rftsim_mpm.errors import MpmError, check_positive
 
 
 @dataclasses.dataclass(frozen=True)
@@ -37,10 +37,7 @@ class Material:
     def __post_init__(self) -> None:
         if not self.mu > 0.0:
             raise MpmError(f"mu must be positive, not {self.mu:g}")
-        for name in ("rho_g", "phi_c", "young"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0.0):
-                raise MpmError(f"{name} must be positive and finite, not {value:g}")
+        check_positive(self, "rho_g", "phi_c", "young")
         if not 0.0 <= self.poisson < 0.5:
             raise MpmError(f"poisson must be in [0, 0.5), not {self.poisson:g}")
         if not (math.isfinite(self.chi) and self.chi >= 0.0):
@@ -50,24 +47,24 @@ class Material:
 
     @classmethod
     def of_density(cls, mu: float, rho_c: float, young: float = 1e6) -> "Material":
-        """NDPM sand of critical density rho_c [kg/m^3]."""
+        """Return NDPM sand of critical density rho_c [kg/m^3]."""
         if not (math.isfinite(rho_c) and rho_c > 0.0):
             raise MpmError(f"rho must be positive and finite, not {rho_c:g}")
         return cls(mu=mu, rho_g=rho_c / 0.6, phi_c=0.6, young=young)
 
     @property
     def rho_c(self) -> float:
-        """Critical density [kg/m^3]."""
+        """Critical density of the sand, phi_c rho_g [kg/m^3]."""
         return self.phi_c * self.rho_g
 
     @property
     def bulk(self) -> float:
-        """Bulk modulus K [Pa]."""
+        """Bulk modulus K of the elastic part [Pa]."""
         return self.young / (3.0 * (1.0 - 2.0 * self.poisson))
 
     @property
     def shear(self) -> float:
-        """Shear modulus G [Pa]."""
+        """Shear modulus G of the elastic part [Pa]."""
         return self.young / (2.0 * (1.0 + self.poisson))
 
     @property
@@ -77,17 +74,17 @@ class Material:
 
     @property
     def constants(self) -> tuple[float, ...]:
-        """What the kernels take: K, G, mu, phi_c, chi, ln(phi_min)."""
+        """Parameters as the compiled loops take them: K, G, mu, phi_c, chi, ln(phi_min)."""
         return self.bulk, self.shear, self.mu, self.phi_c, self.chi, math.log(self.phi_min)
 
 
 def bearing_factor(phi: float) -> float:
-    """N_q = exp(pi tan phi) tan^2(45 deg + phi/2), Prandtl and Reissner, of a friction angle [rad]."""
+    """Return N_q = exp(pi tan phi) tan^2(45 deg + phi/2), Prandtl and Reissner, of a friction angle [rad]."""
     return math.exp(math.pi * math.tan(phi)) * math.tan(math.pi / 4 + phi / 2) ** 2
 
 
 def stiffness(rho: float, gravity: float, depth: float, mu: float, softness: float = 0.02) -> float:
-    """Young's modulus [Pa] under which sand at the bearing pressure of a depth [m] is strained by about `softness`.
+    """Return Young's modulus [Pa] at which the bearing pressure of a depth [m] strains sand by about `softness`.
 
     rho g z N_q / E with the lower friction angle tan phi = mu. Softer sand takes longer steps; forces change by about
     3 % from there on (measured; see the plate study).
@@ -118,7 +115,7 @@ def return_map(p, tau, mu, alpha):
 
 @njit(fastmath=FASTMATH, error_model="numpy", inline="always")
 def flow(theta, theta_d, tau, constants):
-    """What becomes of a trial stress: elastic, on the yield line, or none.
+    """Return what becomes of a trial stress: elastic, on the yield line, or none.
 
     The pressure follows the density, p = K (theta - theta_d). Unlike [Agarwal] section 2.3.1, which integrates its
     rate, this neither drifts nor gains a step's worth of pressure when sand closes.
@@ -151,7 +148,7 @@ def flow(theta, theta_d, tau, constants):
 
 @njit(fastmath=FASTMATH, error_model="numpy", inline="always")
 def respond_plane(stress, theta, theta_d, lxx, lxz, lzx, lzz, constants):
-    """Stress after a step of plane strain, by Jaumann's rate of the deviator.
+    """Return the stress after a step of plane strain, by Jaumann's rate of the deviator.
 
     Args:
         stress: xx, yy, zz, xz at the start [Pa].
@@ -183,7 +180,7 @@ def respond_plane(stress, theta, theta_d, lxx, lxz, lzx, lzz, constants):
 
 @njit(fastmath=FASTMATH, error_model="numpy", inline="always")
 def respond_solid(stress, theta, theta_d, lxx, lxy, lxz, lyx, lyy, lyz, lzx, lzy, lzz, constants):
-    """Stress after a step in three dimensions: as `respond_plane`, of xx, yy, zz, yz, xz, xy."""
+    """Return the stress after a step in three dimensions: as `respond_plane`, of xx, yy, zz, yz, xz, xy."""
     xx, yy, zz, yz, xz, xy = stress
     g2 = 2.0 * constants[1]
     old = (xx + yy + zz) * (1.0 / 3.0)

@@ -1,4 +1,4 @@
-"""Files written whole or not at all."""
+"""Files that are written whole or not at all."""
 
 import contextlib
 import os
@@ -13,7 +13,7 @@ def check_writable(path: Path, *suffixes: str) -> None:
     """Refuse a path whose folder is missing or not writable, or whose ending is none of `suffixes`.
 
     Raises:
-        MpmError: As said.
+        MpmError: The path is such a one, or a folder.
     """
     if suffixes and path.suffix.lower() not in suffixes:
         raise MpmError(f"{path} must end in {' or '.join(suffixes)}")
@@ -27,7 +27,7 @@ def check_writable(path: Path, *suffixes: str) -> None:
 
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """A temporary file beside `path` that takes its place, on the disk, when the block ends well."""
+    """Give a temporary file beside `path` that takes its place, on the disk, when the block ends well."""
     check_writable(path)
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}-", suffix=path.suffix)
     os.close(handle)

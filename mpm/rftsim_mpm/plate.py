@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from rftsim_mpm.body import Body, plane_rotation, turned
 from rftsim_mpm.course import Course
-from rftsim_mpm.errors import MpmError
+from rftsim_mpm.errors import MpmError, check_not_negative, check_positive
 from rftsim_mpm.fields import Camera
 from rftsim_mpm.material import Material, stiffness
 from rftsim_mpm.reading import History, limit
@@ -30,7 +30,7 @@ class Plate:
     dim: int = 2
     """2 for plane strain (forces per metre of width), 3 for a square plate."""
     beta: float = 0.0
-    """Tilt [deg]."""
+    """Tilt of the plate [deg]."""
     gamma: float = 90.0
     """Direction of motion: 0 horizontal, 90 straight down, negative upward [deg]."""
     psi: float = 0.0
@@ -44,11 +44,11 @@ class Plate:
     length: float = 0.05
     """Length (and in 3D width) of the plate [m]."""
     thickness: float | None = None
-    """[m]; 0.3 of the length in the plane, 0.2 in space."""
+    """Thickness of the plate [m]; by default 0.3 of the length in the plane, 0.2 in space."""
     depth: float | None = None
-    """Depth of the leading face's centre at which the force is read [m]; 0.4 of the length."""
+    """Depth of the leading face's centre at which the force is read [m]; by default 0.4 of the length."""
     speed: float = 0.1
-    """[m/s]."""
+    """Speed of the plate [m/s]."""
     buried: float = 0.6
     """Travel before the reading of a plate that starts in the sand [plate lengths]."""
     cells: float = 10.0
@@ -79,17 +79,11 @@ class Plate:
             raise MpmError("psi needs dim 3")
         if not -90.0 <= self.beta <= 90.0 or not -90.0 <= self.gamma <= 90.0 or not -180.0 <= self.psi <= 180.0:
             raise MpmError("beta and gamma must be in [-90, 90] degrees and psi in [-180, 180]")
-        for name in ("rho", "length", "speed", "bed", "courant", "mu_int", "softness", "buried"):
-            if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0.0):
-                raise MpmError(f"{name} must be positive and finite, not {getattr(self, name):g}")
-        for name in ("thickness", "depth", "young"):
-            value = getattr(self, name)
-            if value is not None and not (math.isfinite(value) and value > 0.0):
-                raise MpmError(f"{name} must be positive and finite, not {value:g}")
+        check_positive(self, "rho", "length", "speed", "bed", "courant", "mu_int", "softness", "buried")
+        check_positive(self, "thickness", "depth", "young")
         if not 4.0 <= self.cells <= 200.0:
             raise MpmError(f"cells must be in [4, 200], not {self.cells:g}")
-        if not (math.isfinite(self.mu_surf) and self.mu_surf >= 0.0):
-            raise MpmError(f"mu_surf must be zero or positive, not {self.mu_surf:g}")
+        check_not_negative(self, "mu_surf")
         if not 0.0 <= self.early <= 2.0:
             raise MpmError(f"early must be in [0, 2] cells, not {self.early:g}")
         if self.ppc < 1 or self.xpic < 0:
@@ -106,17 +100,17 @@ class Plate:
 
     @property
     def dx(self) -> float:
-        """Size of a cell [m]."""
+        """Size of a cell of the grid [m]."""
         return self.length / self.cells
 
     @property
     def thick(self) -> float:
-        """Thickness of the plate [m]."""
+        """Thickness of the plate, the default filled in [m]."""
         return self.thickness or (0.3 if self.dim == 2 else 0.2) * self.length
 
     @property
     def z(self) -> float:
-        """Depth of the reading [m]."""
+        """Depth of the leading face's centre at which the force is read, the default filled in [m]."""
         return self.depth or 0.4 * self.length
 
     @property
@@ -126,31 +120,31 @@ class Plate:
 
     @property
     def area(self) -> float:
-        """Of one face [m^2], in the plane a length [m]."""
+        """Area of one face [m^2], in the plane its length [m]."""
         return self.length if self.dim == 2 else self.length**2
 
     @property
     def material(self) -> Material:
-        """The sand."""
+        """Parameters of the sand; Young's modulus, if not given, from the softness at the reading's depth."""
         young = self.young or stiffness(self.rho, 9.81, self.z, self.mu_int, self.softness)
         return Material.of_density(self.mu_int, self.rho, young)
 
     @property
     def direction(self) -> Array:
-        """Of the motion, (dim,)."""
+        """Unit vector along which the plate moves, shape (dim,)."""
         g = math.radians(self.gamma)
         along = [math.cos(g), 0.0, -math.sin(g)]
         return np.array(along if self.dim == 3 else along[::2]).round(15)  # cos 90 degrees is nothing
 
     @property
     def leading(self) -> Array:
-        """Outward normal of the face that leads, of the lower one where the plate moves along itself, (dim,)."""
+        """Outward normal of the face that leads, of the lower one where the plate moves along itself, shape (dim,)."""
         up: Array = self.rotation[:, -1]
         return up if up @ self.direction > 1e-12 else -up
 
     @property
     def rotation(self) -> Array:
-        """Of the plate, whose own lower face looks down."""
+        """Rotation from the plate's frame, in which its lower face looks down, to the world, shape (dim, dim)."""
         b, p = math.radians(self.beta), math.radians(self.psi)
         if self.dim == 2:
             return plane_rotation(-b)
@@ -158,29 +152,32 @@ class Plate:
 
 
 class PlateForce(NamedTuple):
-    """What one plate felt."""
+    """Force on one plate at the reading and along its way, and what it cost to compute."""
 
     force: Array
-    """Of the sand on the plate at the reading, (dim,) [N, in the plane N/m]."""
+    """Force of the sand on the plate at the reading, (dim,) [N, in the plane N/m]."""
     alpha: Array
     """Force per area and depth, (dim,) [N/m^3]."""
     depth: float
-    """Of the leading face's centre [m]."""
+    """Depth of the leading face's centre at the reading [m]."""
     noise: float
-    """Of averages over 0.5 ms, relative [-]."""
+    """Noise of averages over 0.5 ms, relative [-]."""
     heave: float
     """How far the sand has risen beside the plate, on average over a plate's length to either side [m]."""
     history: History
+    """Averages along the way."""
     profile: tuple[Array, Array]
     """Mean stress on the surface while reading: places in the plate's frame [m] and stresses [Pa], (n, dim) both."""
     particles: int
+    """Particles of the bed, without what the plate displaced at its start."""
     steps: int
+    """Time steps of the whole run."""
     seconds: float
-    """Of computing."""
+    """Time that the computation took [s]."""
 
     @property
     def report(self) -> dict[str, Any]:
-        """What files keep of it."""
+        """The numbers at the reading as JSON has them, by name and unit."""
         return {
             "force": self.force.tolist(),
             "depth_m": self.depth,
@@ -194,12 +191,12 @@ class PlateForce(NamedTuple):
 
     @property
     def series(self) -> dict[str, Any]:
-        """What files keep of the way."""
+        """The force along the way as files keep it, thinned."""
         return self.history.series
 
 
 def course(plate: Plate) -> Course:
-    """The plate's way."""
+    """Return the plate's way through the sand, with as much sand around as its mechanism needs."""
     dim, size = plate.dim, plate.length
     grown = 2.0 * plate.early * plate.dx
     shape = box(*([size + grown] * (dim - 1)), plate.thick + grown)
@@ -233,10 +230,10 @@ def course(plate: Plate) -> Course:
 
 
 def measure(plate: Plate, watch: Watch | None = None) -> PlateForce:
-    """Move the plate to a little beyond the reading.
+    """Move the plate to a little beyond the reading and return the force on it.
 
     Args:
-        plate: What to do.
+        plate: The plate, its motion and its sand.
         watch: Called after each step with the simulation and the share of the way that is done.
     """
     way = course(plate)
@@ -256,6 +253,7 @@ def measure(plate: Plate, watch: Watch | None = None) -> PlateForce:
 
 
 def _heave(sim: Simulation, plate: Plate, level: float) -> float:
+    """How far the free surface lies above a level, on average over a plate's length to either side [m]."""
     surface, body = Camera(sim).shoot(sim).surface, sim.bodies[0]
     beside = np.abs(surface[:, 0] - body.position[0]) - np.abs(body.vertices[:, 0] - body.position[0]).max()
     near = (beside > 0.0) & (beside < plate.length)
@@ -263,7 +261,7 @@ def _heave(sim: Simulation, plate: Plate, level: float) -> float:
 
 
 def profile(body: Body, surface: Surface, traction: Array, dx: float) -> tuple[Array, Array]:
-    """Stress on patches of a body's surface, about a cell long each, from that on the points where it touches.
+    """Return the stress on patches of a body's surface, about a cell long each, from that on its points.
 
     Returns:
         Centres of the patches [m] and stress of the sand on each [Pa], in the body's frame.
@@ -276,16 +274,16 @@ def profile(body: Body, surface: Surface, traction: Array, dx: float) -> tuple[A
 
 
 def spread(mu: float) -> float:
-    """How far to either side sand fails under a plate, in plate lengths, and one more: Prandtl's mechanism."""
+    """Return how far to either side sand fails under a plate, in plate lengths, and one more: Prandtl's mechanism."""
     phi = math.atan(mu)
     return 1.0 + math.tan(math.pi / 4 + phi / 2) * math.exp(0.5 * math.pi * mu)
 
 
 def finer(plate: Plate) -> Plate:
-    """The plate of the second resolution: twice the cells in the plane, half as many again in space."""
+    """Return the plate of the second resolution: twice the cells in the plane, half as many again in space."""
     return dataclasses.replace(plate, cells=plate.cells * (2.0 if plate.dim == 2 else 1.5))
 
 
 def extrapolated(coarse: PlateForce, fine: PlateForce, ratio: float) -> Array:
-    """Force in the limit of vanishing cells, (dim,)."""
+    """Return the force in the limit of vanishing cells, from two resolutions, (dim,) [N, in the plane N/m]."""
     return limit(coarse.force, fine.force, ratio)

@@ -1,4 +1,4 @@
-"""Pictures of sand."""
+"""Pictures of sand, and diagrams of what the studies found."""
 
 import math
 from pathlib import Path
@@ -22,10 +22,8 @@ PANELS = {
     "velocity": ("speed [m/s]", "turbo", 99.5),
 }
 """Each field's label, colours, and the percentile that the colours end at."""
-
-
-PIXELS = 900
-"""Most pixels along a picture of sand."""
+MOST_PIXELS = 900
+"""Pixels along the longer side of a picture of sand, at the most."""
 
 
 def draw_field(axes: Axes, frame: Frame, field: str) -> Any:
@@ -63,7 +61,7 @@ def _image(frame: Frame, values: Any) -> tuple[Any, tuple[float, float, float, f
     """Each pixel in the sand has its nearest particle's value, the others are masked; and the edges (x, x, z, z)."""
     spacing = frame.spacing
     low, high = frame.place.min(axis=0) - 0.5 * spacing, frame.place.max(axis=0) + 0.5 * spacing
-    pixel = max(spacing / 3.0, float((high - low).max()) / PIXELS)
+    pixel = max(spacing / 3.0, float((high - low).max()) / MOST_PIXELS)
     shape = np.maximum(np.rint((high - low) / pixel).astype(int), 1)
     x, z = (a + (np.arange(n) + 0.5) * (b - a) / n for a, b, n in zip(low, high, shape, strict=True))
     distance, nearest = cKDTree(frame.place).query(np.stack(np.meshgrid(x, z), axis=-1))
@@ -89,22 +87,6 @@ def _top(outline: Any, x: Any) -> Any:
     share = (x - x0) / np.where(x1 == x0, 1.0, x1 - x0)
     height = np.where((x1 == x0) | (share < 0.0) | (share > 1.0), -np.inf, z0 + share * (z1 - z0))
     return height.max(axis=0)
-
-
-def plot_frame(
-    frame: Frame, title: str, path: Path, fields: tuple[str, ...] = ("strain", "rate", "pressure", "packing")
-) -> None:
-    """Draw some of the fields of one moment."""
-    rows = (len(fields) + 1) // 2
-    aspect = np.ptp(frame.place[:, 1]) / np.ptp(frame.place[:, 0])
-    figure = Figure(figsize=(13, rows * max(2.2, 6.0 * aspect + 0.8)), dpi=110, layout="constrained")
-    axes = figure.subplots(rows, 2, squeeze=False)
-    for axis, field in zip(axes.flat, fields, strict=False):
-        draw_field(axis, frame, field)
-    for axis in axes.flat[len(fields) :]:
-        axis.set_axis_off()
-    figure.suptitle(f"{title}, {frame.time:.3g} s")
-    figure.savefig(path)
 
 
 def plot_history(history: History, title: str, path: Path, frame: Frame | None = None, per: str = "N") -> None:

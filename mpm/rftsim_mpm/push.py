@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rftsim_mpm.course import Course
-from rftsim_mpm.errors import MpmError
+from rftsim_mpm.errors import MpmError, check_not_negative, check_positive
 from rftsim_mpm.intruders import intruder, is_its_own_image
 from rftsim_mpm.material import Material, stiffness
 from rftsim_mpm.reading import History
@@ -27,7 +27,7 @@ class Push:
     theta: float = 0.0
     """Direction of motion in the x-z plane: 0 horizontal, 90 straight down, negative upward [deg]."""
     depth: float = 0.27
-    """Of the centroid at the reading [m]."""
+    """Depth of the centroid at the reading [m]."""
     mu_int: float = 0.4
     """Internal friction of the sand [-]."""
     mu_surf: float = 0.4
@@ -35,25 +35,21 @@ class Push:
     rho: float = 3000.0
     """Critical density of the sand [kg/m^3]."""
     speed: float = 0.2
-    """[m/s]."""
+    """Speed of the solid [m/s]."""
     dx: float = 0.0125
     """Size of a cell [m]."""
     softness: float = 0.02
     """Strain of the sand under the bearing pressure of the reading's depth, rho g z N_q / E."""
     travel: float = 0.04
-    """Before the reading [m]."""
+    """Travel before the reading [m]."""
     bed: float = 1.0
     """Factor on the sand beside and below the solid: two and a half times its radius."""
 
     def __post_init__(self) -> None:
         if not -180.0 <= self.theta <= 180.0:
             raise MpmError(f"theta must be in [-180, 180] degrees, not {self.theta:g}")
-        for name in ("depth", "mu_int", "rho", "speed", "dx", "softness", "travel", "bed"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0.0):
-                raise MpmError(f"{name} must be positive and finite, not {value:g}")
-        if not (math.isfinite(self.mu_surf) and self.mu_surf >= 0.0):
-            raise MpmError(f"mu_surf must be zero or positive, not {self.mu_surf:g}")
+        check_positive(self, "depth", "mu_int", "rho", "speed", "dx", "softness", "travel", "bed")
+        check_not_negative(self, "mu_surf")
 
     @property
     def quick(self) -> "Push":
@@ -62,29 +58,32 @@ class Push:
 
     @property
     def direction(self) -> Array:
-        """Of the motion, (3,)."""
+        """Unit vector along which the solid moves, shape (3,)."""
         t = math.radians(self.theta)
         return np.array([math.cos(t), 0.0, -math.sin(t)]).round(15)
 
 
 class PushForce(NamedTuple):
-    """What one solid felt."""
+    """Force and moment on one solid at the reading and along its way, and what it cost to compute."""
 
     force: Array
-    """Of the sand on the solid at the reading, (3,) [N]."""
+    """Force of the sand on the solid at the reading, (3,) [N]."""
     moment: Array
-    """About its centroid, (3,) [N m]."""
+    """Moment about its centroid, (3,) [N m]."""
     noise: float
-    """Of averages over 0.5 ms, relative [-]."""
+    """Noise of averages over 0.5 ms, relative [-]."""
     history: History
+    """Averages along the way."""
     particles: int
+    """Particles of the bed, without what the solid displaced at its start."""
     steps: int
+    """Time steps of the whole run."""
     seconds: float
-    """Of computing."""
+    """Time that the computation took [s]."""
 
     @property
     def report(self) -> dict[str, Any]:
-        """What files keep of it."""
+        """The numbers at the reading as JSON has them, by name and unit."""
         return {
             "force": self.force.tolist(),
             "moment_N_m": self.moment.tolist(),
@@ -96,12 +95,12 @@ class PushForce(NamedTuple):
 
     @property
     def series(self) -> dict[str, Any]:
-        """What files keep of the way."""
+        """The force along the way as files keep it, thinned."""
         return self.history.series
 
 
 def course(push: Push, shape: Shape) -> Course:
-    """The solid's way."""
+    """Return the solid's way through the sand; a half is modelled where the rest is its mirror image."""
     young = stiffness(push.rho, 9.81, push.depth, push.mu_int, push.softness)
     window = 0.1 * push.travel
     margin = 2.5 * push.bed * shape.radius
@@ -124,7 +123,7 @@ def course(push: Push, shape: Shape) -> Course:
 
 
 def measure(push: Push, watch: Watch | None = None) -> PushForce:
-    """Push the solid to a little beyond the reading; `watch` as in `Course.run`."""
+    """Push the solid to a little beyond the reading and return the force on it; `watch` as in `Course.run`."""
     found = course(push, intruder(push.shape)).run(watch)
     return PushForce(
         found.force, found.moment, found.noise, found.history, len(found.sim.particles), found.sim.steps, found.seconds

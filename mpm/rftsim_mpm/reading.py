@@ -11,40 +11,40 @@ Array = NDArray[np.float64]
 
 AVERAGE = 0.5e-3
 """Length of the averages [s]."""
-POINTS = 100
-"""Points of a history that files keep."""
+MOST_POINTS = 100
+"""Points of a history that files keep, at the most."""
 
 
 class History(NamedTuple):
-    """Averages of one body's force over AVERAGE."""
+    """Averages of one body's force over AVERAGE, along its way."""
 
     travel: Array
     """Distance moved, (n,) [m]."""
     depth: Array
     """Depth of the point that the study reads at, (n,) [m]."""
     force: Array
-    """Of the sand on the body, (n, dim) [N, in the plane N/m]."""
+    """Force of the sand on the body, (n, dim) [N, in the plane N/m]."""
     moment: Array
-    """About the body's origin, (n, 1 or 3) [N m]."""
+    """Moment about the body's origin, (n, 1 or 3) [N m, in the plane N]."""
 
     @property
     def series(self) -> dict[str, Any]:
-        """What files keep of it."""
+        """Travel [m] and force as files keep them, thinned."""
         return thinned(travel_m=self.travel, history=self.force)
 
 
 def thinned(**columns: Array) -> dict[str, Any]:
-    """At most POINTS rows of each, to five digits."""
+    """Return at most MOST_POINTS rows of each column, evenly chosen, to five digits."""
     count = len(next(iter(columns.values())))
-    some = np.linspace(0, count - 1, min(POINTS, count)).astype(int)
+    some = np.linspace(0, count - 1, min(MOST_POINTS, count)).astype(int)
     return {name: np.vectorize(lambda x: float(f"{x:.5g}"))(column[some]).tolist() for name, column in columns.items()}
 
 
 class Reading(NamedTuple):
-    """Force at one place on the way."""
+    """Force on a body at one place on its way."""
 
     force: Array
-    """(dim,)."""
+    """Value of the line there, (dim,) [N, in the plane N/m]."""
     noise: float
     """Standard deviation of the averages about the line, relative to the force [-]."""
 
@@ -54,25 +54,25 @@ class Log:
 
     def __init__(self) -> None:
         self._rows: list[Array] = []
-        self._open: list[Array] = []
+        self._pending: list[Array] = []
         self._until = AVERAGE
 
     def add(self, time: float, travel: float, depth: float, force: Array, moment: Array) -> None:
-        """One step's force."""
-        self._open.append(np.concatenate([[travel, depth], force, moment]))
+        """Take the force and moment of one step, at a time [s], travel [m] and depth [m]."""
+        self._pending.append(np.concatenate([[travel, depth], force, moment]))
         if time >= self._until:
-            self._rows.append(np.mean(self._open, axis=0))
-            self._open.clear()
+            self._rows.append(np.mean(self._pending, axis=0))
+            self._pending.clear()
             self._until = time + AVERAGE
 
     def history(self, dim: int) -> History:
-        """What was collected, whole averages only."""
+        """Return the averages so far, without the one that is not complete."""
         rows = np.array(self._rows).reshape(len(self._rows), -1)
         return History(rows[:, 0], rows[:, 1], rows[:, 2 : 2 + dim], rows[:, 2 + dim :])
 
 
 def read(history: History, travel: float, window: float) -> Reading:
-    """The force at a travel [m]: the value there of a straight line through the averages within `window` [m]."""
+    """Return the force at a travel [m], by a straight line through the averages within `window` [m]."""
     near = np.abs(history.travel - travel) <= window
     if near.sum() < 5:
         raise MpmError(
@@ -86,5 +86,5 @@ def read(history: History, travel: float, window: float) -> Reading:
 
 
 def limit(coarse: Array, fine: Array, ratio: float) -> Array:
-    """The limit of vanishing cells, from two resolutions that differ by `ratio`, by an error of first order."""
+    """Return the limit of vanishing cells, from two resolutions that differ by `ratio`, by an error of first order."""
     return fine + (fine - coarse) / (ratio - 1.0)

@@ -1,4 +1,4 @@
-"""Rerun recordings of sand."""
+"""Recordings of a simulation's sand, bodies and forces, as Rerun shows them."""
 
 import os
 import uuid
@@ -9,13 +9,14 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from rftsim_mpm.errors import MpmError
+from rftsim_mpm.fields import StrainRate, in_slice
 from rftsim_mpm.output import check_writable
 from rftsim_mpm.simulation import Simulation
 
-FPS = 30.0
-"""Frames per simulated second, at first."""
-MOST = 200
-"""Frames at the most: then every second one is left out from there on."""
+FRAMES_PER_SECOND = 30.0
+"""Frames per simulated second, at first [1/s]."""
+HALVE_EVERY = 200
+"""Frames after which, each time, only half as many per second are taken from there on."""
 
 
 class Recorder:
@@ -27,32 +28,32 @@ class Recorder:
         self._temporary = path.with_name(f".{path.stem}-{uuid.uuid4().hex[:8]}.rrd")
         self._stream = rr.RecordingStream("rftsim-mpm", make_default=False)
         self._stream.save(self._temporary)
-        self._next, self._interval, self._frames = 0.0, 1.0 / FPS, 0
-        self._strain: NDArray[np.float64] = np.zeros(0)
-        self._time = 0.0
+        self._next, self._interval, self._frames = 0.0, 1.0 / FRAMES_PER_SECOND, 0
+        self._rate = StrainRate()
 
     def log(self, sim: Simulation) -> None:
-        """Record this moment if a frame is due."""
+        """Record the present moment if a frame is due."""
         if sim.time < self._next:
             return
         self._frames += 1
-        if self._frames % MOST == 0:
+        if self._frames % HALVE_EVERY == 0:
             self._interval *= 2.0
         self._next = sim.time + self._interval
         self._stream.set_time("sim_time", duration=sim.time)
         p = sim.particles
-        if not self._strain.size:
-            self._strain = np.zeros(int(p.number.max()) + 1)
-        rate = (p.strain - self._strain[p.number]) / max(sim.time - self._time, sim.dt)
-        self._strain[p.number], self._time = p.strain, sim.time
+        rate = self._rate.since_last(sim)
         place = p.x if p.dim == 3 else np.insert(p.x, 1, 0.0, axis=1)
-        seen = slice(None) if p.dim == 2 else np.abs(p.x[:, 1] - _middle(sim)) <= 0.51 * sim.dx
+        seen = in_slice(sim)
         self._stream.log(
             "world/sand",
             rr.Points3D(
                 place[seen], colors=_colours(rate[seen]), radii=0.5 * float(np.mean(p.volume)) ** (1.0 / p.dim)
             ),
         )
+        self._log_bodies(sim)
+
+    def _log_bodies(self, sim: Simulation) -> None:
+        p = sim.particles
         for i, body in enumerate(sim.bodies):
             name = f"{i}-{body.shape.name}"
             if p.dim == 2:
@@ -66,7 +67,7 @@ class Recorder:
                 self._stream.log(f"force/{name}/{axis}", rr.Scalars(float(force)))
 
     def close(self) -> None:
-        """Write the recording in its place."""
+        """End the recording and put it in its place."""
         self._stream.flush()
         self._stream.disconnect()
         try:
@@ -75,12 +76,8 @@ class Recorder:
             raise MpmError(f"the recording could not be written to {self._path}: {error}") from error
 
 
-def _middle(sim: Simulation) -> float:
-    return float(sim.bodies[0].position[1]) if sim.bodies else 0.5 * float(sim.size[1])
-
-
 def _colours(rate: NDArray[np.float64]) -> NDArray[np.uint8]:
-    """From sand's own colour at rest to dark red at the 98th percentile."""
+    """Colours from sand's own at rest to dark red at the 98th percentile, (n, 3)."""
     share = np.clip(rate / max(float(np.percentile(rate, 98.0)), 1e-9), 0.0, 1.0)[:, None]
     found: NDArray[np.uint8] = ((1.0 - share) * [222, 203, 164] + share * [140, 20, 30]).astype(np.uint8)
     return found

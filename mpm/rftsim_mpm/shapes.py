@@ -1,13 +1,13 @@
-"""Rigid shapes: polygons in the x-z plane and closed meshes: their distances, and points all over them."""
+"""Rigid shapes, polygons in the x-z plane and closed meshes; and points all over their surfaces."""
 
 import dataclasses
 import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from rftsim_mpm.distances import mesh_distances, polygon_distances
 from rftsim_mpm.errors import MpmError
 
 Array = NDArray[np.float64]
@@ -18,6 +18,7 @@ class Shape:
     """A closed surface about the origin of its own frame."""
 
     name: str
+    """Name of the shape in messages and recordings."""
     vertices: Array
     """Corners, (n, dim) [m]; of a polygon counter-clockwise with x to the right and z up."""
     faces: NDArray[np.int64]
@@ -25,23 +26,23 @@ class Shape:
 
     @property
     def dim(self) -> int:
-        """Dimensions of space."""
+        """Dimensions of space: 2 for a polygon, 3 for a mesh."""
         return int(self.vertices.shape[1])
 
     @property
     def radius(self) -> float:
-        """Of the circle or sphere about the origin that holds the shape [m]."""
+        """Radius of the circle or sphere about the origin that holds the shape [m]."""
         return float(np.linalg.norm(self.vertices, axis=1).max())
 
     @property
     def normals(self) -> Array:
-        """Outward unit normals of the faces, (nface, dim)."""
+        """Outward unit normals of the faces, shape (nface, dim)."""
         normals, _ = _faces(self.vertices, self.faces)
         return normals
 
     @property
     def areas(self) -> Array:
-        """Lengths [m] of a polygon's edges or areas [m^2] of a mesh's faces, (nface,)."""
+        """Lengths [m] of a polygon's edges or areas [m^2] of a mesh's faces, shape (nface,)."""
         _, areas = _faces(self.vertices, self.faces)
         return areas
 
@@ -52,16 +53,16 @@ class Shape:
         return float(heights @ self.areas) / self.dim
 
     def distances(self, points: Array) -> Array:
-        """Signed distances of points, (n, dim), from the surface, negative inside [m]; infinite where far outside."""
+        """Return signed distances of points, (n, dim), from the surface, negative inside, infinite far outside [m]."""
         low, high = self.vertices.min(axis=0), self.vertices.max(axis=0)
         near = ((points >= low) & (points <= high)).all(axis=1)
         found = np.full(len(points), np.inf)
-        measure = _polygon_distances if self.dim == 2 else _mesh_distances
+        measure = polygon_distances if self.dim == 2 else mesh_distances
         found[near] = measure(np.ascontiguousarray(points[near]), self.vertices[self.faces])
         return found
 
     def surface(self, spacing: float, inset: float = 0.0) -> "Surface":
-        """Points about a `spacing` [m] apart all over the surface that lies `inset` [m] inside this one."""
+        """Return points about a `spacing` [m] apart all over the surface that lies `inset` [m] inside this one."""
         points, areas, face = patches(self.vertices[self.faces], spacing)
         normals = self.normals[face]
         points = points - inset * normals
@@ -70,21 +71,21 @@ class Shape:
 
 
 class Surface(NamedTuple):
-    """A body's surface as points, in its own frame."""
+    """Points all over a body's surface, in its own frame."""
 
     points: Array
-    """(n, dim) [m]."""
+    """Places of the points, (n, dim) [m]."""
     normals: Array
-    """Outward, (n, dim)."""
+    """Outward unit normals at the points, (n, dim)."""
     areas: Array
-    """What each stands for, (n,) [m^2, in the plane m]."""
+    """Area of the surface that each point stands for, (n,) [m^2, in the plane m]."""
 
 
 def patches(faces: Array, size: float) -> tuple[Array, Array, NDArray[np.int64]]:
     """Cut edges (n, 2, 2) or triangles (n, 3, 3) into like pieces of about `size` [m].
 
     Returns:
-        Their centres, their lengths or areas, and the faces that they are of.
+        Centres of the pieces, their lengths or areas, and for each the number of the face that it is of.
     """
     places: list[Array] = []
     areas: list[float] = []
@@ -106,18 +107,25 @@ def patches(faces: Array, size: float) -> tuple[Array, Array, NDArray[np.int64]]
         if n > 1 and longest**2 > 8.0 * area:  # slender: halve it
             left += [(np.array([a, 0.5 * (a + b), c]), face), (np.array([0.5 * (a + b), b, c]), face)]
             continue
-        for i in range(n):
-            for j in range(n - i):
-                places.append(a + (b - a) * ((i + 1 / 3) / n) + (c - a) * ((j + 1 / 3) / n))
-                if j < n - i - 1:
-                    places.append(a + (b - a) * ((i + 2 / 3) / n) + (c - a) * ((j + 2 / 3) / n))
+        places += _centres(a, b - a, c - a, n)
         areas += [area / n**2] * n**2
         of += [face] * n**2
     return np.array(places), np.array(areas), np.array(of)
 
 
+def _centres(corner: Array, along: Array, across: Array, n: int) -> list[Array]:
+    """Centres of the n^2 like triangles that a triangle with these two sides from a corner is cut into."""
+    shares = [
+        ((i + third) / n, (j + third) / n)
+        for i in range(n)
+        for j in range(n - i)
+        for third in ((1 / 3, 2 / 3) if j < n - i - 1 else (1 / 3,))
+    ]
+    return [corner + along * u + across * v for u, v in shares]
+
+
 def polygon(points: Array, name: str = "polygon") -> Shape:
-    """A simple polygon, (n, 2), in either order.
+    """Return a simple polygon of corners (n, 2) in either order.
 
     Raises:
         MpmError: Fewer than three corners, corners that coincide, no area, or edges that cross.
@@ -140,7 +148,7 @@ def polygon(points: Array, name: str = "polygon") -> Shape:
 
 
 def mesh(vertices: Array, faces: NDArray[np.int64], name: str = "mesh") -> Shape:
-    """A closed triangle mesh.
+    """Return a closed triangle mesh, its faces turned outward.
 
     Raises:
         MpmError: It is not closed.
@@ -156,7 +164,7 @@ def mesh(vertices: Array, faces: NDArray[np.int64], name: str = "mesh") -> Shape
 
 
 def box(*size: float) -> Shape:
-    """A rectangle (x, z) or a cuboid (x, y, z) about its centre [m]."""
+    """Return a rectangle (x, z) or a cuboid (x, y, z) about its centre [m]."""
     if len(size) not in (2, 3) or not all(math.isfinite(s) and s > 0.0 for s in size):
         raise MpmError(f"a box has two or three positive sizes, not {size}")
     half = np.array(size) / 2.0
@@ -175,7 +183,7 @@ def box(*size: float) -> Shape:
 
 
 def disc(radius: float, sides: int = 48) -> Shape:
-    """A regular polygon of the area of the circle."""
+    """Return a regular polygon of the area of a circle of this radius [m]."""
     if not radius > 0.0:
         raise MpmError(f"radius must be positive, not {radius:g}")
     angle = 2.0 * np.pi * np.arange(sides) / sides
@@ -184,7 +192,7 @@ def disc(radius: float, sides: int = 48) -> Shape:
 
 
 def extruded(shape: Shape, width: float) -> Shape:
-    """The solid that a polygon sweeps along y, centred [m]."""
+    """Return the solid that a polygon sweeps along y, centred, as wide as given [m]."""
     ring = shape.vertices
     caps = _triangulated(ring)
     n = len(ring)
@@ -199,7 +207,7 @@ def extruded(shape: Shape, width: float) -> Shape:
 def wheel(
     radius: float = 0.094, grousers: int = 20, height: float = 0.012, width: float = 0.006, arc: int = 4
 ) -> Shape:
-    """A grousered wheel, by default that of [Agarwal] Table 4.1: a disc with rectangular lugs."""
+    """Return a grousered wheel, by default that of [Agarwal] Table 4.1: a disc with rectangular lugs."""
     half = math.asin(0.5 * width / radius)
     pitch = 2.0 * math.pi / grousers
     corners = []
@@ -215,6 +223,7 @@ def wheel(
 
 
 def _faces(vertices: Array, faces: NDArray[np.int64]) -> tuple[Array, Array]:
+    """Outward unit normals of edges or triangles, and their lengths or areas."""
     if vertices.shape[1] == 2:
         along = vertices[faces[:, 1]] - vertices[faces[:, 0]]
         across = np.column_stack([along[:, 1], -along[:, 0]])
@@ -267,92 +276,3 @@ def _triangulated(ring: Array) -> NDArray[np.int64]:
         else:
             raise MpmError("the outline cannot be cut into triangles; do its edges touch?")
     return np.array([*triangles, tuple(left)], dtype=np.int64)
-
-
-@njit(error_model="numpy")
-def _segment(px, pz, ax, az, bx, bz):
-    """Squared distance of a point from a segment."""
-    ux, uz, wx, wz = bx - ax, bz - az, px - ax, pz - az
-    t = min(max((wx * ux + wz * uz) / (ux * ux + uz * uz), 0.0), 1.0)
-    return (wx - t * ux) ** 2 + (wz - t * uz) ** 2
-
-
-@njit(error_model="numpy", cache=True)
-def _polygon_distances(points, edges):
-    """Signed distances of points, (n, 2), from a polygon's edges, (m, 2, 2); the sign by counting crossings."""
-    found = np.empty(points.shape[0])
-    for p in range(points.shape[0]):
-        px, pz = points[p, 0], points[p, 1]
-        best, inside = np.inf, False
-        for e in range(edges.shape[0]):
-            ax, az, bx, bz = edges[e, 0, 0], edges[e, 0, 1], edges[e, 1, 0], edges[e, 1, 1]
-            best = min(best, _segment(px, pz, ax, az, bx, bz))
-            if (az > pz) != (bz > pz) and px < ax + (pz - az) / (bz - az) * (bx - ax):
-                inside = not inside
-        found[p] = -np.sqrt(best) if inside else np.sqrt(best)
-    return found
-
-
-@njit(error_model="numpy")
-def _dot(a, b):
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@njit(error_model="numpy")
-def _minus(a, b):
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
-
-
-@njit(error_model="numpy")
-def _to_edge(w, u):
-    """Squared distance of a point, w from one end, from a segment u."""
-    t = min(max(_dot(w, u) / _dot(u, u), 0.0), 1.0)
-    r = w[0] - t * u[0], w[1] - t * u[1], w[2] - t * u[2]
-    return _dot(r, r)
-
-
-@njit(error_model="numpy", cache=True)
-def _mesh_distances(points, triangles):
-    """Signed distances of points, (n, 3), from a closed mesh, (m, 3, 3); the sign by the solid angle about each."""
-    found = np.empty(points.shape[0])
-    for p in range(points.shape[0]):
-        best, angle = np.inf, 0.0
-        for t in range(triangles.shape[0]):
-            a = (
-                triangles[t, 0, 0] - points[p, 0],
-                triangles[t, 0, 1] - points[p, 1],
-                triangles[t, 0, 2] - points[p, 2],
-            )
-            b = (
-                triangles[t, 1, 0] - points[p, 0],
-                triangles[t, 1, 1] - points[p, 1],
-                triangles[t, 1, 2] - points[p, 2],
-            )
-            c = (
-                triangles[t, 2, 0] - points[p, 0],
-                triangles[t, 2, 1] - points[p, 1],
-                triangles[t, 2, 2] - points[p, 2],
-            )
-            ab, bc, ca = _minus(b, a), _minus(c, b), _minus(a, c)
-            n = ab[1] * -ca[2] + ab[2] * ca[1], ab[2] * -ca[0] + ab[0] * ca[2], ab[0] * -ca[1] + ab[1] * ca[0]
-            n2 = _dot(n, n)
-            height = _dot(a, n)
-            foot = (height / n2 * n[0], height / n2 * n[1], height / n2 * n[2])
-            over = True
-            for edge, start in ((ab, a), (bc, b), (ca, c)):
-                w = _minus(foot, start)
-                turn = (
-                    edge[1] * w[2] - edge[2] * w[1],
-                    edge[2] * w[0] - edge[0] * w[2],
-                    edge[0] * w[1] - edge[1] * w[0],
-                )
-                over = over and _dot(turn, n) >= 0.0
-            if over:
-                best = min(best, height * height / n2)
-            else:
-                for edge, start in ((ab, a), (bc, b), (ca, c)):
-                    best = min(best, _to_edge((-start[0], -start[1], -start[2]), edge))
-            la, lb, lc = np.sqrt(_dot(a, a)), np.sqrt(_dot(b, b)), np.sqrt(_dot(c, c))
-            angle += 2.0 * np.arctan2(height, la * lb * lc + _dot(a, b) * lc + _dot(b, c) * la + _dot(c, a) * lb)
-        found[p] = -np.sqrt(best) if abs(angle) > 2.0 * np.pi else np.sqrt(best)
-    return found

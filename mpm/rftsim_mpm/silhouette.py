@@ -1,6 +1,7 @@
 """Shapes from files: meshes, and the outline of what is dark, or opaque, in a PNG."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,26 +13,35 @@ Array = NDArray[np.float64]
 
 
 def load_shape(path: Path, *, scale: float = 1.0) -> Shape:
-    """A mesh from a file (STL, OBJ, PLY, ...), or the silhouette of a PNG, as wide as `scale` [m]."""
+    """Return a file's mesh (STL, OBJ, PLY, ...) times `scale`, or a PNG's silhouette, as wide as `scale` [m]."""
     if not path.is_file():
         raise MpmError(f"no file {path}")
     if path.suffix.lower() == ".png":
         return silhouette(path, width=scale)
-    import trimesh  # slow to import, and pictures do not need it
-
-    try:
-        body = trimesh.load_mesh(path)
-    except (ValueError, NotImplementedError, KeyError, IndexError) as error:
-        raise MpmError(f"cannot read a mesh from {path}: {error}") from error
+    body = read_mesh(path)
     return mesh(np.array(body.vertices) * scale, np.array(body.faces), path.name)
 
 
+def read_mesh(path: Path) -> Any:
+    """Return the triangles of a file as trimesh has them, closed or not.
+
+    Raises:
+        MpmError: There is no such file, or no mesh in it.
+    """
+    import trimesh  # slow to import, and pictures do not need it
+
+    try:
+        return trimesh.load_mesh(path)
+    except (OSError, ValueError, NotImplementedError, KeyError, IndexError) as error:
+        raise MpmError(f"cannot read a mesh from {path}: {error}") from error
+
+
 def silhouette(path: Path, *, width: float, tolerance: float = 1.5) -> Shape:
-    """The one figure in a PNG as a polygon about its centroid.
+    """Return the one figure in a PNG as a polygon about its centroid.
 
     Args:
         path: The picture; the figure is what is opaque or, without transparency, what is darker than half.
-        width: Of the figure from left to right [m].
+        width: Extent of the figure from left to right [m].
         tolerance: How far corners may be left out of the outline [pixels].
 
     Raises:
@@ -117,7 +127,7 @@ def _simplified(loop: Array, tolerance: float) -> Array:
 
 
 def _centroid(corners: Array) -> Array:
-    """Of the area of a polygon."""
+    """Centroid of the area of a polygon, (2,)."""
     after = np.roll(corners, -1, axis=0)
     cross = corners[:, 0] * after[:, 1] - corners[:, 1] * after[:, 0]
     found: Array = ((corners + after) * cross[:, None]).sum(axis=0) / (3.0 * cross.sum())

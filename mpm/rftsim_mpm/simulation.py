@@ -1,4 +1,4 @@
-"""Sand, bodies and a box, stepped explicitly."""
+"""Sand, rigid bodies and a box, stepped explicitly in time."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -24,9 +24,9 @@ INSET = 0.5
 What is pushed on the grid moves with it a good part of a cell further out, so that bodies act too wide and too deep.
 """
 SPACING = 0.25
-"""Between the points of a body's surface, in cells: more make no difference."""
+"""Distance between the points of a body's surface, in cells: more points make no difference."""
 CONTACT_STIFFNESS = 1.0
-"""Of the contact layer, in Young's moduli per cell: sand sinks in by p / E cells."""
+"""Stiffness of the contact layer, in Young's moduli per cell: sand sinks in by p / E cells."""
 COURANT = 0.3
 """Time step in cells per compression wave."""
 SORT_EVERY = 80
@@ -52,15 +52,15 @@ class Simulation:
 
     Args:
         material: The sand.
-        particles: Taken over, not copied.
+        particles: The sand as it begins; taken over, not copied.
         dx: Size of a cell [m].
         size: The box, from the origin [m]; its lower and upper faces across each axis but the top are mirrors.
         bodies: Rigid intruders.
-        gravity: (dim,) or the strength of one along -z [m/s^2].
-        wall_friction: Of the lower and the upper face across each axis, (dim, 2), or one number for all [-].
+        gravity: Acceleration, (dim,), or the strength of one along -z [m/s^2].
+        wall_friction: Friction of the lower and the upper face across each axis, (dim, 2), or one number for all [-].
         dt: Time step; COURANT cells per wave if not given [s].
         xpic: Order of the velocity filter; 0 for FLIP. It acts on each step, so it damps.
-        inset: See INSET; in cells.
+        inset: How far inside a body's surface contact lies, see INSET [cells].
     """
 
     def __init__(
@@ -90,11 +90,11 @@ class Simulation:
         self.gravity = np.array([0.0] * (dim - 1) + [-gravity]) if np.ndim(gravity) == 0 else np.asarray(gravity, float)
         self.wall_friction = np.array(np.broadcast_to(wall_friction, (dim, 2)), float)
         self.wall_impulse = np.zeros((dim, 2, dim))
-        """Of each wall on the sand during the last step [N s]."""
+        """Impulse of each wall on the sand during the last step, (dim, 2, dim) [N s]."""
         self.force = np.zeros((len(self.bodies), dim))
-        """Of the sand on each body at the last step [N]."""
+        """Force of the sand on each body at the last step, (nbody, dim) [N, in the plane N/m]."""
         self.moment = np.zeros((len(self.bodies), 1 if dim == 2 else 3))
-        """About each body's origin [N m]."""
+        """Moment of the sand about each body's origin, (nbody, 1 or 3) [N m, in the plane N]."""
         self.xpic = xpic
         self._shape = np.array(cells) + 3
         self._low = np.zeros(dim)
@@ -103,9 +103,9 @@ class Simulation:
         self._grid, self._flow = np.zeros((nodes, ROW)), np.zeros((nodes, ROW))
         self.inset = inset * dx
         self.surfaces = [body.shape.surface(SPACING * dx, self.inset) for body in self.bodies]
-        """Of each body, where it touches the sand."""
+        """Surface of each body where it touches the sand, `inset` inside its own."""
         self.traction = [np.zeros_like(surface.points) for surface in self.surfaces]
-        """Of each on the sand at the last step, at the surface's points and in the body's frame, (n, dim) [Pa]."""
+        """Traction of each body on the sand at the last step, at its points and in its frame, (n, dim) [Pa]."""
         self._check()
 
     def _check(self) -> None:
@@ -122,7 +122,7 @@ class Simulation:
                 )
 
     def clear_bodies(self) -> None:
-        """Take away the sand that bodies occupy."""
+        """Take away the sand in the places that bodies occupy."""
         keep = np.ones(len(self.particles), bool)
         for body in self.bodies:
             keep &= body.shape.distances(body.to_local(self.particles.x)) > -self.inset
@@ -130,7 +130,7 @@ class Simulation:
         self._check()
 
     def step(self) -> None:
-        """One time step."""
+        """Move sand and bodies by one time step."""
         if self.steps % SORT_EVERY == 0:
             self._sort()
         p, k, grid = self.particles, self._kernels, (self._low, 1.0 / self.dx, self._shape)

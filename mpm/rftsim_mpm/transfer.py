@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
-from rftsim_mpm.compiled import FASTMATH, SOURCE
+from rftsim_mpm.compiled import FASTMATH, SOURCE_HASH
 from rftsim_mpm.lanes import four, lane, load, store
 from rftsim_mpm.material import respond_plane, respond_solid
 
@@ -25,46 +25,53 @@ OPTIONS = {"fastmath": FASTMATH, "error_model": "numpy", "cache": True}
 
 
 class Transfer(NamedTuple):
-    """The compiled loops of one dimension."""
+    """The compiled loops between particles and grid, of two or three dimensions."""
 
     scatter: Any
+    """Sums the particles onto the grid."""
     gather: Any
+    """Moves the particles and updates their stress."""
     order: Any
+    """Returns the permutation that sorts particles by cell."""
     project: Any
+    """Takes from velocities what they have on the grid."""
 
 
 @njit(inline="always")
 def spline(f):
-    """The three weights of a quadratic B-spline at a distance f in [1/2, 3/2) from its first node, in cells."""
+    """Return the three weights of a quadratic B-spline at a distance f in [1/2, 3/2) from its first node, in cells."""
     return 0.5 * (1.5 - f) * (1.5 - f), 0.75 - (f - 1.0) * (f - 1.0), 0.5 * (f - 0.5) * (f - 0.5)
 
 
 @njit(inline="always")
 def slope(f):
-    """Derivatives of `spline` by f."""
+    """Return the derivatives of the three weights of `spline` by f."""
     return f - 1.5, 2.0 - 2.0 * f, f - 0.5
 
 
 @njit(inline="always")
 def pick(w, a):
-    """One of three, without the branches of a tuple's own index."""
+    """Return one of three numbers, without the branches of a tuple's own index."""
     return w[0] if a == 0 else (w[1] if a == 1 else w[2])
 
 
 @njit(inline="always")
 def small_exp(e):
-    """exp(e) to round-off for |e| < 0.01, more than a step strains: the library's costs as much as a stress update."""
+    """Return exp(e) to round-off for |e| < 0.01, more than a step strains.
+
+    The library's costs as much as a stress update.
+    """
     return 1.0 + e * (1.0 + e * (0.5 + e * (1 / 6 + e * (1 / 24 + e * (1 / 120 + e / 720)))))
 
 
 def make_transfer(dim: int) -> Transfer:
-    """The loops of two (plane strain) or three dimensions."""
-    DIM, DEPTH, source = dim, 3 if dim == 3 else 1, SOURCE  # noqa: N806
+    """Return the compiled loops of two dimensions (plane strain) or three."""
+    DIM, NODES_Y, source = dim, 3 if dim == 3 else 1, SOURCE_HASH  # noqa: N806
     last = dim - 1
 
     @njit(inline="always")
     def reach(x, p, low, inv_dx, shape):
-        """The first of a particle's nodes, and the weights of three along x, z and y, each followed by its slopes.
+        """Return a particle's first node, and the weights of three along x, z and y, each followed by its slopes.
 
         In the plane the three along y are one, of weight 1.
         """
@@ -99,7 +106,7 @@ def make_transfer(dim: int) -> Transfer:
                 tx, ty, tz = four(0.0, txx, txy, txz), four(0.0, txy, tyy, tyz), four(0.0, txz, tyz, tzz)
             for a in range(3):
                 wa, sa = pick(wx, a), pick(sx, a)
-                for b in range(DEPTH):
+                for b in range(NODES_Y):
                     row = first + (a * ny + b) * nz
                     wb = pick(wy, b)
                     wab = wa * wb
@@ -129,7 +136,7 @@ def make_transfer(dim: int) -> Transfer:
             by_x, by_y, by_z = zero, zero, zero  # derivatives of the new one
             for a in range(3):
                 wa, sa = pick(wx, a), pick(sx, a)
-                for b in range(DEPTH):
+                for b in range(NODES_Y):
                     row = first + (a * ny + b) * nz
                     wb = pick(wy, b)
                     wab = wa * wb
@@ -178,7 +185,7 @@ def make_transfer(dim: int) -> Transfer:
 
     @njit(**OPTIONS)
     def order(x, low, inv_dx, shape):
-        """The permutation that sorts particles by cell, (n,): a counting sort, so equal cells keep their order."""
+        """Return the permutation that sorts particles by cell, (n,); those of one cell keep their order."""
         source  # noqa: B018
         n = x.shape[0]
         cell = np.empty(n, np.int64)
@@ -196,6 +203,7 @@ def make_transfer(dim: int) -> Transfer:
             count[cell[p]] += 1
         return found
 
+    # Six levels deep, since as two loops one after the other it sums in another order in the plane: other last bits.
     @njit(**OPTIONS)
     def project(x, mass, low, inv_dx, shape, grid, u):
         """Take from velocities, (n, dim), what they have on the grid: u -= P u, by mass-weighted means."""
@@ -208,7 +216,7 @@ def make_transfer(dim: int) -> Transfer:
                 moved = mass[p] * four(1.0, u[p, 0], u[p, 1], u[p, 2] if DIM == 3 else 0.0)
                 seen = four(0.0, 0.0, 0.0, 0.0)
                 for a in range(3):
-                    for b in range(DEPTH):
+                    for b in range(NODES_Y):
                         row = first + (a * ny + b) * nz
                         wab = pick(wx, a) * pick(wy, b)
                         for c in range(3):

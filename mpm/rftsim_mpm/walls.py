@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from rftsim_mpm.compiled import FASTMATH, SOURCE
+from rftsim_mpm.compiled import FASTMATH, SOURCE_HASH
 from rftsim_mpm.lanes import four, load, store
 from rftsim_mpm.transfer import CHANGE, FORCE, MOMENTUM, OPTIONS, VELOCITY
 
 
 @njit(inline="always")
 def mirrored(shape, at, found):
-    """Fill a node's images behind the walls it is next to, itself first; returns how many.
+    """Fill a node's images behind the walls it is next to, itself first, and return how many these are.
 
     A row of `found` is the image's number and, for each axis, the sign that mirroring gives to that component.
     """
@@ -71,8 +71,8 @@ def _rub(grid, shape, dt, axis, side, mu, flow, impulse):
 
 
 def make_grid_step(dim: int) -> Any:
-    """The grid step of two or three dimensions."""
-    DIM, source = dim, SOURCE  # noqa: N806
+    """Return the compiled grid step of two or three dimensions."""
+    DIM, source = dim, SOURCE_HASH  # noqa: N806
 
     @njit(**OPTIONS)
     def step(grid, shape, gravity, dt, friction, flow, impulse):
@@ -81,9 +81,9 @@ def make_grid_step(dim: int) -> Any:
         Args:
             grid: (nnode, ROW), as `scatter` and the contacts leave it; gravity is added to its forces.
             shape: Nodes along each axis, (dim,); at least 7.
-            gravity: (dim,) [m/s^2].
-            dt: [s].
-            friction: Of the lower and the upper wall across each axis, (dim, 2).
+            gravity: Acceleration, (dim,) [m/s^2].
+            dt: Time step [s].
+            friction: Friction of the lower and the upper wall across each axis, (dim, 2).
             flow: Filled: new velocity and its change, (nnode, ROW).
             impulse: Filled: impulse of each wall on the sand, (dim, 2, dim) [N s].
         """

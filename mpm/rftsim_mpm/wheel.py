@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rftsim_mpm.bed import level_bed
 from rftsim_mpm.body import Body
-from rftsim_mpm.errors import MpmError
+from rftsim_mpm.errors import MpmError, check_positive
 from rftsim_mpm.follow import Track, follow
 from rftsim_mpm.material import Material, stiffness
 from rftsim_mpm.reading import thinned
@@ -30,14 +30,15 @@ class Wheel:
     entry: float = 0.8
     """Forward speed at the start, over omega r, r with grousers [-]."""
     radius: float = 0.094
-    """Without grousers [m]."""
+    """Radius without grousers [m]."""
     grousers: int = 20
+    """How many grousers the wheel has."""
     height: float = 0.012
-    """Of a grouser [m]."""
+    """Height of a grouser [m]."""
     width: float = 0.006
-    """Of a grouser, along the rim [m]."""
+    """Width of a grouser, along the rim [m]."""
     breadth: float = 0.14
-    """Of the wheel [m]; masses and forces are divided by it."""
+    """Breadth of the wheel [m]; masses and forces are divided by it."""
     mass_x: float = 23.0
     """Inertia along [kg]."""
     mass_z: float = 6.3
@@ -55,16 +56,14 @@ class Wheel:
     xpic: int = 0
     """Order of XPIC; 0 is FLIP."""
     gravity: float = 9.81
-    """[m/s^2]."""
+    """Acceleration of gravity [m/s^2]."""
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.rpm) and self.rpm != 0.0):
             raise MpmError(f"rpm must be finite and not zero, not {self.rpm:g}")
-        if self.duration is not None and not (math.isfinite(self.duration) and self.duration > 0.0):
-            raise MpmError(f"duration must be positive and finite, not {self.duration:g}")
-        for name in ("radius", "height", "width", "breadth", "mass_x", "mass_z", "mu_int", "rho", "dx"):
-            if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0.0):
-                raise MpmError(f"{name} must be positive and finite, not {getattr(self, name):g}")
+        check_positive(
+            self, "duration", "radius", "height", "width", "breadth", "mass_x", "mass_z", "mu_int", "rho", "dx"
+        )
         if self.grousers < 2 or self.grousers * self.width >= 2.0 * math.pi * self.radius:
             raise MpmError(f"{self.grousers} grousers of {self.width:g} m do not fit on the wheel; 2 at least")
         if self.xpic < 0:
@@ -79,22 +78,22 @@ class Wheel:
 
     @property
     def outer(self) -> float:
-        """Radius with grousers [m]."""
+        """Radius of the wheel with its grousers [m]."""
         return self.radius + self.height
 
     @property
     def time(self) -> float:
-        """Simulated time [s]."""
+        """Simulated time, the default filled in [s]."""
         return self.duration or 1.0 + 30.0 / abs(self.rpm)
 
 
 class Rolling(NamedTuple):
-    """Means over the last 40 % of the run."""
+    """How a wheel rolled: means over the last 40 % of the run, and the run itself."""
 
     speed: float
-    """[m/s]."""
+    """Mean forward speed [m/s]."""
     sinkage: float
-    """Of the outer circle below the level surface [m]."""
+    """Mean sinkage of the outer circle below the level surface [m]."""
     slip: float
     """1 - v / (omega r), r with grousers [-]."""
     drop: float
@@ -102,16 +101,17 @@ class Rolling(NamedTuple):
     drift: float
     """Change of the speed over that time, relative: how far from steady the wheel still is [-]."""
     time: Array
-    """Of the whole run, (n,) [s]."""
+    """Times of the whole run, (n,) [s]."""
     speeds: Array
-    """(n,) [m/s]."""
+    """Speed at these times, (n,) [m/s]."""
     sinkages: Array
-    """(n,) [m]."""
+    """Sinkage at these times, (n,) [m]."""
     track: Track
+    """The run as it was followed, with a frame of its end."""
 
     @property
     def report(self) -> dict[str, Any]:
-        """What files keep of the means."""
+        """The means as JSON has them, by name and unit."""
         return {
             "speed_m_s": self.speed,
             "sinkage_m": self.sinkage,
@@ -122,14 +122,28 @@ class Rolling(NamedTuple):
 
     @property
     def series(self) -> dict[str, Any]:
-        """What files keep of the run."""
+        """Speed and sinkage over time as files keep them, thinned."""
         return thinned(time_s=self.time, speeds_m_s=self.speeds, sinkages_m=self.sinkages)
 
 
 def roll(study: Wheel, watch: Watch | None = None) -> Rolling:
-    """Lower the wheel onto a bed, spin it and let it go."""
-    omega, outer, dx = study.rpm * 2.0 * math.pi / 60.0, study.outer, study.dx
-    depth = math.ceil(1.5 * outer / dx) * dx
+    """Lower the wheel onto a bed, spin it and let it go, and return how it rolled."""
+    sim = _prepared(study)
+    track = follow(sim, study.time, watch)
+    level = _bed_depth(study)
+    speeds, sinkages = track.velocity[:, 0, 0], level + study.outer - track.position[:, 0, 1]
+    late = track.time >= 0.6 * study.time
+    speed, sinkage = float(speeds[late].mean()), float(sinkages[late].mean())
+    slope = float(np.polyfit(track.time[late], speeds[late], 1)[0])
+    slip, drift = 1.0 - speed / (_omega(study) * study.outer), 0.4 * study.time * slope / speed
+    drop = _drop(study, track.frames[-1].surface, float(sim.bodies[0].position[0]))
+    return Rolling(speed, sinkage, slip, drop, drift, track.time, speeds, sinkages, track)
+
+
+def _prepared(study: Wheel) -> Simulation:
+    """The bed, a half of a grouser's height into which the wheel has sunk, at its speed of entry."""
+    omega, outer, dx = _omega(study), study.outer, study.dx
+    depth = _bed_depth(study)
     before = 2.5 * outer
     length = math.ceil((2.0 * before + abs(omega) * outer * study.time) / dx) * dx
     young = stiffness(study.rho, study.gravity, 0.3 * outer, study.mu_int, 0.01)
@@ -144,10 +158,9 @@ def roll(study: Wheel, watch: Watch | None = None) -> Rolling:
         mass=np.array([study.mass_x, study.mass_z]) / study.breadth,
         load=np.array([math.copysign(study.push, omega), -weight]) / study.breadth,
     )
-    bed = level_bed(material, (length, depth), dx, gravity=study.gravity)
     sim = Simulation(
         material,
-        bed,
+        level_bed(material, (length, depth), dx, gravity=study.gravity),
         dx,
         (length, depth + 3.0 * outer),
         bodies=[body],
@@ -156,17 +169,24 @@ def roll(study: Wheel, watch: Watch | None = None) -> Rolling:
         xpic=study.xpic,
     )
     sim.clear_bodies()
-    track = follow(sim, study.time, watch)
-    speeds, sinkages = track.velocity[:, 0, 0], depth + outer - track.position[:, 0, 1]
-    late = track.time >= 0.6 * study.time
-    speed, sinkage = float(speeds[late].mean()), float(sinkages[late].mean())
-    slope = float(np.polyfit(track.time[late], speeds[late], 1)[0])
-    surface, middle = track.frames[-1].surface, float(body.position[0])
-    way = math.copysign(1.0, omega)
+    return sim
+
+
+def _omega(study: Wheel) -> float:
+    """Spin of the wheel [rad/s]."""
+    return study.rpm * 2.0 * math.pi / 60.0
+
+
+def _bed_depth(study: Wheel) -> float:
+    """Depth of the bed, in whole cells [m]."""
+    return math.ceil(1.5 * study.outer / study.dx) * study.dx
+
+
+def _drop(study: Wheel, surface: Array, middle: float) -> float:
+    """How much lower the surface is behind the wheel than ahead, each from one to two radii from its middle [m]."""
+    outer, way = study.outer, math.copysign(1.0, study.rpm)
     behind, ahead = (
         surface[(way * s * (surface[:, 0] - middle) > outer) & (way * s * (surface[:, 0] - middle) < 2.0 * outer)]
         for s in (-1.0, 1.0)
     )
-    drop = float(ahead[:, 1].mean() - behind[:, 1].mean())
-    slip, drift = 1.0 - speed / (omega * outer), 0.4 * study.time * slope / speed
-    return Rolling(speed, sinkage, slip, drop, drift, track.time, speeds, sinkages, track)
+    return float(ahead[:, 1].mean() - behind[:, 1].mean())

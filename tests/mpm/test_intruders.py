@@ -15,7 +15,7 @@ ELLIPSOID = 4.0 / 3.0 * np.pi * 0.075 * 0.045 * 0.045
      ("prism-tall", 0.5 * 0.105**2 * 0.075)],
 )  # fmt: skip
 def test_volumes(name, volume):
-    """Of the solids as given; what is round has chords for arcs."""
+    """Volumes of the solids are those of the sizes given; what is round has chords for arcs."""
     shape = intruder(name)
     assert shape.content == pytest.approx(volume, rel=0.015)
     assert abs(shape.normals.T @ shape.areas).max() < 1e-12

@@ -6,7 +6,7 @@ from rftsim_mpm.campaign import DATA, results, status
 from rftsim_mpm.reading import limit
 
 ALPHA_Z = 0.87574
-"""Of a flat plate pushed down, over xi_n, by Table C.3."""
+"""alpha_z of a flat plate pushed down, over xi_n, by Table C.3."""
 TABLE_C1 = {0.3: 0.51e6, 0.4: 0.92e6, 0.5: 1.58e6}
 """xi_n at rho 3000 kg/m^3 by internal friction [N/m^3], [Agarwal] appendix C."""
 

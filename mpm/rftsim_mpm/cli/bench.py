@@ -1,4 +1,4 @@
-"""`rftsim-mpm bench`: throughput."""
+"""The command `rftsim-mpm bench`, which measures throughput."""
 
 import dataclasses
 
@@ -22,10 +22,10 @@ class Bench:
     quick: bool = False
     """Fewer particles and repetitions; one process."""
     json: bool = False
-    """Print JSON."""
+    """Print JSON instead of a table."""
 
     def __call__(self) -> None:
-        """Measure and print."""
+        """Measure, and print a table or JSON."""
         if self.processes < 1:
             raise MpmError(f"processes must be at least 1, not {self.processes}")
         report = {}

@@ -1,4 +1,4 @@
-"""`rftsim-mpm campaign`: grids of plates and pushes."""
+"""The commands `rftsim-mpm campaign ...`: grids of plates, pushes and wheels."""
 
 import dataclasses
 import os
@@ -28,7 +28,7 @@ class Work:
     ray: str | None = None
     """Use Ray instead: "local", or the address of a cluster."""
     json: bool = False
-    """Print JSON."""
+    """Print JSON instead of lines for people."""
 
     def __post_init__(self) -> None:
         if self.processes < 1:
@@ -58,7 +58,7 @@ class Work:
 
 @dataclasses.dataclass(frozen=True)
 class CampaignRun:
-    """Compute the plates and pushes of a TOML file; what is there already is kept.
+    """Compute the plates, pushes and wheels of a TOML file; what is there already is kept.
 
     Example: rftsim-mpm campaign run plates.toml out/plates
     """
@@ -72,7 +72,7 @@ class CampaignRun:
     """Coarser cells and less sand: a look, not a measurement."""
 
     def __call__(self) -> None:
-        """Run."""
+        """Make the campaign's folder and compute what it lacks."""
         jobs = read_jobs(self.file)
         if self.quick:
             jobs = [job.quick for job in jobs]
@@ -88,7 +88,7 @@ class CampaignResume:
     work: tyro.conf.OmitArgPrefixes[Work] = dataclasses.field(default_factory=Work)
 
     def __call__(self) -> None:
-        """Run the rest."""
+        """Compute what the campaign in the folder lacks."""
         manifest(self.folder)
         self.work(self.folder)
 
@@ -101,10 +101,10 @@ class CampaignStatus:
     plot: Path | None = None
     """Draw force per area and depth against the direction of motion, .png, .pdf or .svg."""
     json: bool = False
-    """Print JSON."""
+    """Print JSON instead of lines for people."""
 
     def __call__(self) -> None:
-        """Say."""
+        """Say how far the campaign is, and draw."""
         if self.plot:
             check_writable(self.plot, ".png", ".pdf", ".svg")
         found = status(self.folder)
@@ -124,10 +124,10 @@ class CampaignVerify:
 
     folder: Folder
     json: bool = False
-    """Print JSON."""
+    """Print JSON instead of lines for people."""
 
     def __call__(self) -> None:
-        """Check and say."""
+        """Check every result and say which are damaged."""
         found = status(self.folder)
         _say(self.folder, found, self.json, {})
         if found.damaged:
@@ -142,7 +142,7 @@ class CampaignCommand(
         | Annotated[CampaignVerify, tyro.conf.subcommand("verify")]
     ]
 ):
-    """A grid of plates or pushes as independent processes; stop it in any way, and resume."""
+    """A grid of plates, pushes or wheels as independent processes; stop it in any way, and resume."""
 
 
 def _say(folder: Path, found: Status, json: bool, more: dict[str, Any]) -> None:

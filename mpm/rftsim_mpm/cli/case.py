@@ -1,4 +1,4 @@
-"""`rftsim-mpm case`: the verification cases of the source."""
+"""The commands `rftsim-mpm case ...`: the verification cases of the source."""
 
 import dataclasses
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""`rftsim-mpm plate`: force on a plate moved through sand."""
+"""The command `rftsim-mpm plate`: force on a plate moved through sand."""
 
 import dataclasses
 from pathlib import Path
@@ -10,16 +10,19 @@ from rftsim_mpm.plate import Array, Plate, PlateForce, extrapolated, finer, meas
 from rftsim_mpm.simulation import Watch
 
 
-class Pushed(NamedTuple):
-    """What one plate felt, the sand at the end, and what a finer one felt."""
+class PlateFound(NamedTuple):
+    """The force on a plate, the sand at the end, and the force with finer cells if it was asked for."""
 
     force: PlateForce
+    """The measurement on the plate as it was asked for."""
     frame: Frame
+    """The sand at the end."""
     fine: PlateForce | None
+    """The measurement with finer cells, or None."""
 
 
 @dataclasses.dataclass(frozen=True)
-class PlateCommand(StudyCommand[Plate, Pushed]):
+class PlateCommand(StudyCommand[Plate, PlateFound]):
     """Push or drag a flat plate through level sand and read its force.
 
     Example: rftsim-mpm plate --mu-int 0.4 --extrapolate --plot plate.png
@@ -32,7 +35,7 @@ class PlateCommand(StudyCommand[Plate, Pushed]):
     def _quicker(self) -> Plate:
         return self.study.quick
 
-    def _run(self, study: Plate, watch: Watch) -> Pushed:
+    def _run(self, study: Plate, watch: Watch) -> PlateFound:
         second = finer(study) if self.extrapolate else None
         first = 1.0 if second is None else 1.0 / (1.0 + (second.cells / study.cells) ** (study.dim + 1))
         shoot, frames = with_last_frame(lambda sim, share: watch(sim, first * share))
@@ -40,9 +43,9 @@ class PlateCommand(StudyCommand[Plate, Pushed]):
         fine = None
         if second is not None:
             fine = measure(second, lambda sim, share: watch(sim, first + (1.0 - first) * share))
-        return Pushed(force, frames[0], fine)
+        return PlateFound(force, frames[0], fine)
 
-    def _report(self, study: Plate, found: Pushed) -> dict[str, Any]:
+    def _report(self, study: Plate, found: PlateFound) -> dict[str, Any]:
         places, stresses = found.force.profile
         report = {
             "young_Pa": study.material.young,
@@ -57,7 +60,7 @@ class PlateCommand(StudyCommand[Plate, Pushed]):
             report["limit"] = {"force": limit.tolist(), "alpha": (limit / (study.area * study.z)).tolist()}
         return report
 
-    def _lines(self, study: Plate, found: Pushed) -> list[str]:
+    def _lines(self, study: Plate, found: PlateFound) -> list[str]:
         force, rows = found.force, [("", found.force.force)]
         if found.fine is not None:
             rows.append((f"{finer(study).cells:g} cells: ", found.fine.force))
@@ -71,7 +74,7 @@ class PlateCommand(StudyCommand[Plate, Pushed]):
             f"{1e-6 * _rate(force):.1f} M particle-updates/s",
         ]
 
-    def _draw(self, study: Plate, found: Pushed, path: Path) -> None:
+    def _draw(self, study: Plate, found: PlateFound, path: Path) -> None:
         from rftsim_mpm.plots import plot_history
 
         plot_history(found.force.history, _title(study), path, found.frame, _unit(study))

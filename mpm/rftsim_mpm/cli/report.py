@@ -1,4 +1,4 @@
-"""What the commands have in common: progress, and printing."""
+"""Progress and printing, which all commands have in common."""
 
 import contextlib
 import json
@@ -11,7 +11,7 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 
 @contextlib.contextmanager
 def progress(title: str, *, quiet: bool) -> Iterator[Callable[[float], None]]:
-    """A bar on standard error with the time left; the block reports the share that is done, from 0 to 1."""
+    """Show a bar on standard error with the time left; the block reports the share that is done, from 0 to 1."""
     columns = TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn()
     bar = Progress(
         *columns, TextColumn("left"), TimeRemainingColumn(), console=Console(stderr=True), transient=True, disable=quiet

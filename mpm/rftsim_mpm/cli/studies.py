@@ -1,4 +1,4 @@
-"""`rftsim-mpm drag`, `wheel` and `collapse`."""
+"""The commands `rftsim-mpm drag`, `rftsim-mpm wheel` and `rftsim-mpm collapse`."""
 
 import dataclasses
 from pathlib import Path
@@ -69,10 +69,10 @@ class WheelCommand(StudyCommand[Wheel, Rolling]):
         return roll(study, watch)
 
     def _report(self, study: Wheel, found: Rolling) -> dict[str, Any]:
-        return found.report | {"speed_over_sqrt_gl": found.speed / _root(study)}
+        return found.report | {"speed_over_sqrt_gl": found.speed / _unit_speed(study)}
 
     def _lines(self, study: Wheel, found: Rolling) -> list[str]:
-        scaled = found.speed / _root(study)
+        scaled = found.speed / _unit_speed(study)
         return [
             f"{study.rpm:g} RPM: {found.speed:.4f} m/s, {scaled:.3f} sqrt(g l), slip {found.slip:.3f}; "
             f"over that time the speed changes by {100 * found.drift:.0f} %",
@@ -85,8 +85,8 @@ class WheelCommand(StudyCommand[Wheel, Rolling]):
         plot_wheel(found.time, found.speeds, found.sinkages, found.track.frames[-1], f"wheel, {study.rpm:g} RPM", path)
 
 
-def _root(study: Wheel) -> float:
-    """sqrt(g l) with l the outer diameter [m/s]."""
+def _unit_speed(study: Wheel) -> float:
+    """Speed that the wheel's is scaled by, sqrt(g l) with l the outer diameter [m/s]."""
     return float((study.gravity * 2.0 * study.outer) ** 0.5)
 
 
@@ -130,7 +130,7 @@ def _arrays(found: list[Runout]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _exponents(found: list[Runout]) -> dict[str, float]:
-    """Of the squat and of the tall columns, where there are two or more."""
+    """Exponents of the squat and of the tall columns' run-out, where there are two or more of them."""
     aspects, runouts = _arrays(found)
     parts = {"squat": aspects <= 2.0, "tall": aspects >= 3.0}
     return {name: exponent(aspects[own], runouts[own]) for name, own in parts.items() if own.sum() >= 2}

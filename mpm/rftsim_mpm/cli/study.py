@@ -1,4 +1,4 @@
-"""What the commands that run a study share: settings, a bar, a picture, a recording, and JSON."""
+"""Commands that run a study: its settings, a bar, a picture, a recording, and JSON."""
 
 import abc
 import contextlib
@@ -24,12 +24,12 @@ Chosen = TypeVar("Chosen", bound=Callable[[], None])
 
 @dataclasses.dataclass(frozen=True)
 class Outputs:
-    """Where results go."""
+    """Where a study's results go, and whether it is run quickly."""
 
     quick: bool = False
     """Coarser and shorter: a look, not a measurement."""
     json: bool = False
-    """Print JSON."""
+    """Print JSON instead of lines for people."""
     plot: Path | None = None
     """Draw the result, .png, .pdf or .svg."""
     record: Path | None = None
@@ -46,7 +46,7 @@ class Outputs:
 
     @contextlib.contextmanager
     def watching(self, title: str) -> Iterator[Watch]:
-        """A bar with the time left, and the recording."""
+        """Give a watch that moves a bar with the time left, and records the first run."""
         with contextlib.ExitStack() as stack:
             show = stack.enter_context(progress(title, quiet=self.json))
             recorder: Any = None
@@ -97,12 +97,12 @@ class StudyCommand(abc.ABC, Generic[Study, Found]):
     """A study's settings, where its results go, and what is said of them."""
 
     title: ClassVar[str]
-    """Of the bar."""
+    """Title of the bar that shows how far the study is."""
     study: tyro.conf.OmitArgPrefixes[Study]
     out: tyro.conf.OmitArgPrefixes[Outputs]
 
     def __call__(self) -> None:
-        """Run and report."""
+        """Run the study, print what it found and draw it."""
         self.out.check()
         study = self._quicker() if self.out.quick else self.study
         with self.out.watching(self.title) as watch:
@@ -112,19 +112,19 @@ class StudyCommand(abc.ABC, Generic[Study, Found]):
 
     @abc.abstractmethod
     def _quicker(self) -> Study:
-        """The study as `--quick` runs it."""
+        """Return the study as `--quick` runs it."""
 
     @abc.abstractmethod
     def _run(self, study: Study, watch: Watch) -> Found:
-        """Do it."""
+        """Run the study and return what it found."""
 
     @abc.abstractmethod
     def _report(self, study: Study, found: Found) -> dict[str, Any]:
-        """What JSON says besides the study's settings."""
+        """Return what JSON says besides the study's settings."""
 
     @abc.abstractmethod
     def _lines(self, study: Study, found: Found) -> list[str]:
-        """The same for people."""
+        """Return the lines that say the same to people."""
 
     @abc.abstractmethod
     def _draw(self, study: Study, found: Found, path: Path) -> None:
@@ -132,7 +132,7 @@ class StudyCommand(abc.ABC, Generic[Study, Found]):
 
 
 def with_last_frame(watch: Watch) -> tuple[Watch, list[Frame]]:
-    """A watch that also takes a frame at the end; its rates are means over the last twentieth of the way."""
+    """Return a watch that also takes a frame at the end, and that frame; rates are over the last twentieth."""
     cameras: list[Camera] = []
     frames: list[Frame] = []
 
@@ -148,10 +148,10 @@ def with_last_frame(watch: Watch) -> tuple[Watch, list[Frame]]:
 
 @dataclasses.dataclass(frozen=True)
 class Group(Generic[Chosen]):
-    """A command made of others."""
+    """A command that is made of other commands."""
 
     command: Chosen
 
     def __call__(self) -> None:
-        """Run the one that was asked for."""
+        """Run the command that was asked for."""
         self.command()
