@@ -15,6 +15,7 @@ import numpy as np
 
 from rftsim.law.laws import get_law
 from rftsim.law.layout import BLOCK, COLUMNS, pack_bed, pack_surface
+from rftsim.law.leading import leads
 from rftsim.reduction.reduce import middle
 from rftsim.sand.free_surface import FreeSurface
 from rftsim.sand.medium import Sand
@@ -163,7 +164,7 @@ def _motion(surface: Surface) -> tuple[Array, Array, Array, Array]:
 def _leading(surface: Surface) -> float:
     _, _, velocity, omega = _motion(surface)
     moving = velocity + np.cross(omega, surface.centres)
-    return float((np.einsum("ij,ij->i", surface.normals, moving) >= 0.0).mean())
+    return float(leads(surface.normals, moving).mean())
 
 
 def _literal(oracle: Any, surface: Surface, count: int) -> None:

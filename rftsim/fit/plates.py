@@ -14,6 +14,7 @@ import numpy as np
 
 from rftsim.errors import RftsimError
 from rftsim.fit.columns import read_columns
+from rftsim.law.leading import leads
 from rftsim.surface.triangles import EDGE_ON_DOUBLE, Array, Surface
 
 ANGLES: Final = ("beta", "gamma", "psi")
@@ -98,7 +99,7 @@ def leading_faces(plates: Plates) -> Faces:
     across = np.stack([-np.sin(psi), np.cos(psi), np.zeros_like(psi)], axis=1)
     along = np.stack([np.cos(beta) * np.cos(psi), np.cos(beta) * np.sin(psi), np.sin(beta)], axis=1)
     t = plates.thickness[:, None]
-    front = np.where((m * v).sum(axis=1, keepdims=True) >= -EDGE_ON_DOUBLE, m, -m)
+    front = np.where(leads(m, v, EDGE_ON_DOUBLE)[:, None], m, -m)
     found = []
     for normal, reach, area in [(m, t / 2, 1.0), (-m, t / 2, 1.0)] + [
         (side * axis, 0.5, t[:, 0]) for axis in (along, across) for side in (1.0, -1.0)
@@ -110,8 +111,8 @@ def leading_faces(plates: Plates) -> Faces:
         np.concatenate([n for n, _ in found]),
         np.concatenate([w * np.ones(plates.n) for _, w in found]),
     )
-    leads = ((normal * v[row]).sum(axis=1) >= -EDGE_ON_DOUBLE) & (weight > 0.0)
-    return Faces(row[leads], normal[leads], v[row][leads], weight[leads])
+    leading = leads(normal, v[row], EDGE_ON_DOUBLE) & (weight > 0.0)
+    return Faces(row[leading], normal[leading], v[row][leading], weight[leading])
 
 
 def at_unit_depth(normal: Array) -> Surface:

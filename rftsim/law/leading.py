@@ -7,8 +7,14 @@ against the other.
 
 from typing import Any, Final, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from rftsim.law.vectors import larger, smaller
 from rftsim.machine.kernel import kernel
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 SHARP: Final = 1e300
 """Steepness of the rule as published, which is a jump."""
@@ -61,3 +67,15 @@ def speed_in_plane(n: Any, v: Any, frame: Any) -> Any:
     px, py, pz = uy * ez - uz * ey, uz * ex - ux * ez, ux * ey - uy * ex
     across = (n[0] * px + n[1] * py + n[2] * pz) * (v[0] * px + v[1] * py + v[2] * pz)
     return n[0] * v[0] + n[1] * v[1] + n[2] * v[2] - across
+
+
+def leads(normals: Array, velocities: Array, tolerance: float = 0.0) -> Flags:
+    """Whether each of many faces leads under the rule as published, shape (n,).
+
+    Args:
+        normals: Outward unit normals, shape (n, 3).
+        velocities: Velocities, shape (n, 3).
+        tolerance: Rounding of the normals [-]: n.v_hat down to minus this counts as leading.
+    """
+    flags: Flags = may_lead((normals * velocities).sum(axis=1), (velocities**2).sum(axis=1), tolerance**2) >= 0.0
+    return flags

@@ -166,7 +166,7 @@ def test_users_cache_follows_the_package(compiler, tmp_path, monkeypatch):
 @pytest.mark.slow
 def test_compiled_here_it_is_the_same(fresh):
     """What numba compiles for this processor moves the wheel as what ships does; again from the cache, at once."""
-    shutil.rmtree(fresh / "rftsim" / "shipped")
+    shutil.rmtree(fresh / "rftsim" / link.SHIPPED.relative_to(PACKAGE))
     here = first_force(fresh)
     kept = sorted(path.name for path in (fresh / "rftsim" / "__pycache__").glob("*.o.xz"))
     assert len(kept) == len(PARTS)

@@ -73,6 +73,20 @@ def test_selection_drops_nothing_that_has_a_stress(response, normal, across, beh
         assert stress.inertia == 0.0
 
 
+@pytest.mark.parametrize("tolerance", TOLERANCES)
+def test_many_faces_lead_as_one_does(tolerance):
+    """`leads` of arrays is `share` of each face under the rule as published."""
+    rng = np.random.default_rng(2)
+    normals, velocities = rng.normal(size=(2, 500, 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    velocities[::5] = np.cross(normals, velocities)[::5]  # along the face
+    cosines = (normals * velocities).sum(axis=1) / np.linalg.norm(velocities, axis=1)
+    apart = np.abs(cosines + tolerance) > 1e-14
+    one_by_one = [leading.share(cosine, 1.0, Edge(tolerance, SHARP)) > 0.5 for cosine in cosines[apart]]
+    np.testing.assert_array_equal(leading.leads(normals, velocities, tolerance)[apart], one_by_one)
+    assert 0 < sum(one_by_one) < len(one_by_one)
+
+
 def test_selection_is_no_more_than_it_must_be():
     """A face a fifth of a radian behind the edge is passed over, under the published rule and the implicit force's."""
     v = (0.0, 0.0, -1.0)
