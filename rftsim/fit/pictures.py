@@ -12,7 +12,7 @@ from rftsim.fit.trials import Found
 
 def plot_map(report: Report, title: str, path: Path) -> None:
     """Draw the law against the plates into a file: everything at once, and in plane over the direction of motion."""
-    from matplotlib.figure import Figure  # not before it is needed, as in `plots`
+    from matplotlib.figure import Figure  # not before it is needed: it takes a second
 
     figure = Figure(figsize=(15, 5.5), layout="constrained")
     parity, *sections = figure.subplots(1, 3)
@@ -63,7 +63,7 @@ def _often(tilts: Any, most: int = 7) -> list[float]:
 
 def plot_trial(found: Found, title: str, path: Path) -> None:
     """Draw a trial's readings and what was fitted to them, into a file."""
-    from matplotlib.figure import Figure  # not before it is needed, as in `plots`
+    from matplotlib.figure import Figure  # not before it is needed: it takes a second
 
     figure = Figure(figsize=(7, 5), layout="constrained")
     axis = figure.subplots()

@@ -1,6 +1,6 @@
 """Machine code of the entries: what ships where it fits, else what was compiled before, else compiled now.
 
-It is made by `native_build` in parts, each an object file of LLVM. What ships is for x86-64-v3 under Linux and was made
+It is made by `build` in parts, each an object file of LLVM. What ships is for x86-64-v3 under Linux and was made
 from these very sources; then neither numba nor a cache is needed.
 """
 
