@@ -12,13 +12,13 @@ from rftsim.reduction.reduce import Economy
 from rftsim.surface.triangles import Array
 
 
-def economise(model: mujoco.MjModel, felt: Felt, sand: Array, tolerance: float) -> dict[str, Economy]:
+def economise(model: mujoco.MjModel, felt: Felt, bed: Array, tolerance: float) -> dict[str, Economy]:
     """Replace surfaces by the fewest elements that keep a tolerance, and say so in the reasons.
 
     Args:
         model: Compiled.
         felt: The bodies that feel the sand; changed in place.
-        sand: Packed sand.
+        bed: Packed sand.
         tolerance: Largest error of a body's wrench, over the largest wrench.
 
     Returns:
@@ -27,7 +27,7 @@ def economise(model: mujoco.MjModel, felt: Felt, sand: Array, tolerance: float) 
     economies = {}
     for name, surface in felt.surfaces.items():
         reach = functools.partial(sampled_reach, model, model.body(name).id, surface)
-        felt.surfaces[name], economies[name] = reduce.reduced(surface, sand, tolerance, reach)
+        felt.surfaces[name], economies[name] = reduce.reduced(surface, bed, tolerance, reach)
         felt.reasons[name] += f"; {_said(economies[name], tolerance)}"
     return economies
 

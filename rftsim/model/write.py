@@ -57,18 +57,18 @@ def check_drawing(spec: mujoco.MjSpec, name: str) -> None:
             raise SceneError(f"the model has a {kind} {_drawing(name)!r} already: rename it, or pass draw=False")
 
 
-def write_bed(spec: mujoco.MjSpec, carrier: Carrier, sand: Array, surfaces: Mapping[str, Surface]) -> None:
+def write_bed(spec: mujoco.MjSpec, carrier: Carrier, bed: Array, surfaces: Mapping[str, Surface]) -> None:
     """Put a bed of sand and the surfaces of bodies into a spec.
 
     Args:
         spec: The model; every body that feels the sand has its name.
         carrier: The plugin instance that is made.
-        sand: Packed sand.
+        bed: Packed sand.
         surfaces: Surface of each body that feels the sand, by body name.
     """
     spec.activate_plugin(carrier.plugin)
     spec.add_plugin(name=carrier.name, plugin_name=carrier.plugin, active=True)
-    spec.add_numeric(name=engine.SAND_MARKER + carrier.name, data=sand, size=sand.size)
+    spec.add_numeric(name=engine.SAND_MARKER + carrier.name, data=bed, size=bed.size)
     for body, surface in surfaces.items():
         _attach(spec.body(body).plugin, carrier)
         data = layout.pack_surface(surface)
