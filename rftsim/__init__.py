@@ -1,7 +1,7 @@
 """Sand for MuJoCo: granular resistive forces on the bodies of any model."""
 
 from rftsim.engine import plugin as _plugin
-from rftsim.errors import RftsimError, RftsimWarning, SandError, SceneError, SurfaceError
+from rftsim.errors import RftsimError, RftsimNote, RftsimWarning, SandError, SceneError, SurfaceError
 from rftsim.law.laws import LAWS, Law
 from rftsim.law.rigid import SurfaceForce, surface_force
 from rftsim.model.add_sand import Bed, add_sand, load

@@ -1,4 +1,4 @@
-"""The errors that rftsim raises, and the warning that it warns with."""
+"""The errors that rftsim raises, the warning that it warns with, and the note by which it tells its choices."""
 
 
 class RftsimError(ValueError):
@@ -19,3 +19,7 @@ class SceneError(RftsimError):
 
 class RftsimWarning(UserWarning):
     """Warning of something that will be computed but is doubtful, with numbers."""
+
+
+class RftsimNote(UserWarning):
+    """Note of a choice that was made at load, as whose place the sand takes: nothing is wrong, but one should know."""

@@ -30,7 +30,7 @@ UPWARD = (-0.1, 0.0, 1.0)
 @pytest.fixture(scope="module")
 def drop(tmp_path_factory):
     """A recorded drop: the model, the file's contents, and what `rftsim` said at each frame."""
-    model = rftsim.load(DROP, terrain=rftsim.FreeSurface(0.01, UPWARD))
+    model = rftsim.load(DROP, terrain=rftsim.FreeSurface(0.01, UPWARD), tolerance=0.0)
     data, path, truth = mujoco.MjData(model), tmp_path_factory.mktemp("drop") / "drop.rrd", []
     with record.Recorder(model, path, fps=FPS) as recorder:
         while data.time < 0.8:
@@ -151,7 +151,7 @@ def test_scalars_of_the_caller(drop):
 
 @pytest.fixture(scope="module")
 def model():
-    return rftsim.load(DROP)
+    return rftsim.load(DROP, tolerance=0.0)
 
 
 @pytest.mark.parametrize("path", ["sand/force", "/world/x", "", "reward//x"])
@@ -199,9 +199,9 @@ def test_a_model_without_sand(tmp_path):
     assert not any(entity.startswith("/sand") for entity in contents)
 
 
-def test_every_geom_and_a_finer_surface(tmp_path):
+def test_a_finer_surface(tmp_path):
     """The drawn triangles need not be those that feel the sand; each takes the nearest one's traction."""
-    model = rftsim.load(DROP, geoms="all", max_edge=0.02)
+    model = rftsim.load(DROP, max_edge=0.02, tolerance=0.0)
     data = mujoco.MjData(model)
     data.qpos[2] = 0.05
     data.qvel[2] = -1.0
@@ -214,7 +214,7 @@ def test_every_geom_and_a_finer_surface(tmp_path):
     coloured = np.array(skin["Mesh3D:vertex_colors"][0])[::3] != traction_colours(np.array([-1.0]), 1.0)
     assert coloured[height < -0.01].all()
     assert not coloured[height > 0.01].any()
-    assert "/world/body/front\\ box/mark" not in contents, "it is part of the skin"
+    assert "/world/body/front\\ box/mark" in contents, "it collides with nothing, and the box has a geom that does"
 
 
 def unwritable(folder):

@@ -6,7 +6,7 @@ from typing import Final, NamedTuple
 import mujoco
 import numpy as np
 
-from rftsim.model.add_sand import add_sand
+from rftsim.model.add_sand import WHOLE, add_sand
 from rftsim.model.readout import instances
 from rftsim_envs.physics import Physics
 from rftsim_envs.task import Config, Task
@@ -35,7 +35,7 @@ def lay(task: Task, robot: mujoco.MjSpec | None = None) -> mujoco.MjModel:
     config, spec = task.config, task.build() if robot is None else robot
     spec.option.timestep = config.timestep
     if config.ground == "sand":
-        add_sand(spec, config.sand, config.law, bodies=task.felt, max_edge=task.edge, **task.options())
+        add_sand(spec, config.sand, config.law, bodies=task.felt, max_edge=task.edge, **{**WHOLE, **task.options()})
     else:
         _add_floor(spec)
     return spec.compile()

@@ -11,7 +11,7 @@ import numpy as np
 from rftsim_models import parts
 from rftsim_models.hexapod import LEGS, TRIPODS, build_hexapod
 
-from rftsim.model.add_sand import add_sand
+from rftsim.model.add_sand import WHOLE, add_sand
 from rftsim.run.scenes import POPPY, SCENES, Measured, Staged, stage
 
 GAIT: Final = 10.0
@@ -76,7 +76,7 @@ def _hexapod(law: str, *, timestep: float | None = None, **options: Any) -> Stag
     spec = _hexapod_without_sand()
     spec.option.timestep = timestep or spec.option.timestep
     options.setdefault("max_edge", math.inf)
-    bed = add_sand(spec, POPPY, law, bodies=(parts.TORSO, *LEGS), draw=False, **options)
+    bed = add_sand(spec, POPPY, law, bodies=(parts.TORSO, *LEGS), draw=False, **{**WHOLE, **options})
     return Staged(spec.compile(), bed, Measured(parts.TORSO, None), SETTLING)
 
 

@@ -8,7 +8,7 @@ from typing import Any, Final, Literal, NamedTuple
 import mujoco
 import numpy as np
 
-from rftsim.model.add_sand import add_sand
+from rftsim.model.add_sand import WHOLE, add_sand
 from rftsim.sand.medium import Sand
 
 SAND: Final = Sand(rho_c=3000.0, mu_int=0.4, mu_surf=0.4, xi_n=0.92e6)
@@ -55,7 +55,7 @@ class Trial:
     def __init__(self, spec: mujoco.MjSpec, h: float, force: Force, **options: Any) -> None:
         spec.option.timestep = h
         sand = options.pop("sand", SAND)
-        add_sand(spec, sand, options.pop("law", "rft3d"), force=force, draw=False, **options)
+        add_sand(spec, sand, options.pop("law", "rft3d"), force=force, draw=False, **{**WHOLE, **options})
         self.h = h
         self.model = spec.compile()
         self.data = mujoco.MjData(self.model)

@@ -13,6 +13,7 @@ from rftsim.cli.output import print_json, print_line
 from rftsim.cli.settings import Settings, read_settings
 from rftsim.errors import RftsimError
 from rftsim.model.add_sand import Bed
+from rftsim.model.geometry import Meshes
 from rftsim.run.advice import advise
 from rftsim.run.scenes import Staged, stage
 
@@ -36,10 +37,10 @@ class Inspect:
     """Largest error of a body's wrench, from which follows how many elements it needs."""
     speed: float | None = None
     """Speed that decides on the law [m/s]; by default that of the fastest body at the start."""
-    disable_floor: bool = False
-    """Take collision from planes at the sand's level."""
-    allow_open: bool = False
-    """Accept meshes that are not closed."""
+    keep_floor: bool = False
+    """Leave the floor as it is; by default the sand takes its place."""
+    meshes: Meshes | None = None
+    """How the meshes of model files are felt: as hulls by which MuJoCo collides with them, or as they are."""
     json: bool = False
     """Print JSON."""
 
@@ -47,7 +48,7 @@ class Inspect:
         """Stage the scene, whole and reduced, and print how it is modelled."""
         if self.speed is not None and not self.speed >= 0.0:
             raise RftsimError(f"the speed must be zero or more, not {self.speed:g} m/s")
-        whole, lean = self._stage(None), self._stage(self.tolerance)
+        whole, lean = self._stage(0.0), self._stage(self.tolerance)
         bed = whole.bed
         advice = advise(lean.model, lean.bed, self.speed)
         bodies = {name: _body(bed, lean.bed, name) for name in bed.reasons}
@@ -80,15 +81,15 @@ class Inspect:
             change = "keep" if one.law == bed.law.name else f"--law {one.law}, not"
             print_line(console, f"law: {change} {bed.law.name}: {one.reason}")
 
-    def _stage(self, tolerance: float | None) -> Staged:
+    def _stage(self, tolerance: float) -> Staged:
         return stage(
             self.scene,
             sand=self.sand,
             law=self.law,
             settings=read_settings(self.set),
             tolerance=tolerance,
-            disable_floor=self.disable_floor,
-            allow_open=self.allow_open,
+            keep_floor=self.keep_floor,
+            meshes=self.meshes,
         )
 
 

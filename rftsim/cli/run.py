@@ -16,6 +16,7 @@ from rftsim.cli.output import print_doubts, print_json, print_written
 from rftsim.cli.results import draw
 from rftsim.cli.settings import Settings, read_settings
 from rftsim.files import check_writable
+from rftsim.model.geometry import Meshes
 from rftsim.run.run import SAMPLES, run
 from rftsim.run.run import Run as Finished
 from rftsim.run.scenes import Staged, stage
@@ -52,10 +53,10 @@ class Run:
     """Draw the run, .png, .pdf or .svg."""
     picture: Path | None = None
     """Render the last moment with the sand's traction as arrows, .png."""
-    disable_floor: bool = False
-    """Take collision from planes at the sand's level."""
-    allow_open: bool = False
-    """Accept meshes that are not closed."""
+    keep_floor: bool = False
+    """Leave the floor as it is; by default the sand takes its place."""
+    meshes: Meshes | None = None
+    """How the meshes of model files are felt: as hulls by which MuJoCo collides with them, or as they are."""
     json: bool = False
     """Print JSON."""
 
@@ -93,8 +94,8 @@ class Run:
             duration=self.duration,
             force=self.force,
             tolerance=self.tolerance,
-            disable_floor=self.disable_floor,
-            allow_open=self.allow_open,
+            keep_floor=self.keep_floor,
+            meshes=self.meshes,
         )
 
     def _report(self, staged: Staged, finished: Finished, warnings: list[str]) -> dict[str, Any]:

@@ -3,20 +3,34 @@
 import warnings
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, Final, Literal, NamedTuple, get_args
 
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rftsim.engine import plugin
-from rftsim.errors import RftsimWarning, SceneError
+from rftsim.engine import block, plugin
+from rftsim.errors import RftsimNote, RftsimWarning, SceneError
 from rftsim.law import layout
 from rftsim.law.laws import Law, get_law
-from rftsim.model.draft import make_draft, name_bodies
+from rftsim.model import doubts
+from rftsim.model.draft import Draft, make_draft, name_bodies
 from rftsim.model.economy import economise
-from rftsim.model.felt import Choice, felt_bodies
-from rftsim.model.floors import disable_floors, find_floors, floor_doubts
+from rftsim.model.felt import Choice, Felt, felt_bodies
+from rftsim.model.floors import (
+    Floors,
+    Ground,
+    carrying,
+    find_floors,
+    find_ground,
+    floor_doubts,
+    remove_floors,
+    say_ground,
+)
+from rftsim.model.geometry import Geoms, Meshes
+from rftsim.model.shaping import Fineness
+from rftsim.model.standing import stand
+from rftsim.model.start import start
 from rftsim.model.wheels import rolling
 from rftsim.model.write import (
     Carrier,
@@ -31,7 +45,14 @@ from rftsim.reduction.reduce import Economy
 from rftsim.sand.free_surface import FreeSurface
 from rftsim.sand.medium import Sand
 from rftsim.sand.presets import make_sand
-from rftsim.surface.triangles import Surface, Wheel
+from rftsim.surface.triangles import Array, Surface, Wheel
+
+TOLERANCE: Final = 0.01
+"""Largest error of a body's wrench for which its surface is reduced, unless the caller says otherwise [-]."""
+WHOLE: Final[Mapping[str, Any]] = {"terrain": 0.0, "meshes": "exact", "tolerance": 0.0}
+"""Options of models that were made for sand: level at z = 0, every triangle felt, and meshes as they are."""
+Force = Literal["implicit", "explicit"]
+"""When the sand's force is taken: at the end of the step, or at the velocity of the moment."""
 
 
 class Bed(NamedTuple):
@@ -49,10 +70,12 @@ class Bed(NamedTuple):
     """Surface of each body that feels the sand, by body name."""
     reasons: dict[str, str]
     """Why each body of the model does or does not feel it, by body name."""
+    choices: tuple[str, ...]
+    """Sentences that say what was chosen for the model, one for each kind."""
     notes: tuple[str, ...]
-    """Sentences that say what was found doubtful or repaired."""
+    """Sentences that say what was found doubtful or repaired, one for each kind."""
     economies: dict[str, Economy]
-    """Numbers of the surfaces before and after they were reduced, by body name; empty without a tolerance."""
+    """Numbers of the surfaces before and after they were reduced, by body name; empty at zero tolerance."""
 
 
 def add_sand(
@@ -61,45 +84,49 @@ def add_sand(
     law: "Law | str" = "rft3d",
     *,
     bodies: "Iterable[str] | str | None" = None,
-    terrain: "FreeSurface | float" = 0.0,
+    terrain: "FreeSurface | float | None" = None,
+    keep_floor: bool = False,
     plane: ArrayLike = (0.0, 1.0, 0.0),
-    geoms: Literal["collision", "all"] = "collision",
+    geoms: Geoms = "collision",
+    meshes: Meshes = "hull",
     max_edge: float | None = None,
-    tolerance: float | None = None,
+    tolerance: float = TOLERANCE,
     wheels: "Mapping[str, Wheel] | Iterable[str] | str" = (),
-    disable_floor: bool = False,
-    allow_open: bool = False,
     sensors: bool = True,
     draw: bool = True,
-    force: Literal["implicit", "explicit"] = "implicit",
+    force: Force = "implicit",
     name: str = "sand",
 ) -> Bed:
-    """Put sand under a model that is not compiled yet.
+    """Put sand under a model that is not compiled yet, in the place of the floor that it stands on.
 
     Bodies without a name get one. Each body that feels the sand gets a sensor `<body>_sand` of its wrench: force, then
-    moment about the body's origin, world frame.
+    moment about the body's origin, world frame. Choices are told as `RftsimNote`, doubts as `RftsimWarning`. The
+    integrator RK4 gives way to implicitfast, unless the force is explicit.
 
     Args:
         spec: The model; changed in place.
         sand: The medium, see `make_sand`.
         law: A law, its name, or `rft3d:FILE.toml`, see `get_law`.
         bodies: Names of the bodies that feel the sand; by default each that can move and has geoms.
-        terrain: The free surface of the sand, or its height [m].
+        terrain: The free surface of the sand, or its height [m]; by default that of the floor: the top of the plane,
+            box, mesh or height field that the model stands on at its first keyframe, or z = 0 where there is none.
+        keep_floor: Leave the floors at the sand's level as they are. By default they lose their collision, and their
+            contact pairs, and are hidden.
         plane: Normal of the vertical plane of motion, for the 2D laws.
-        geoms: Which geoms bound a body: those that can collide, or all.
+        geoms: Which geoms bound a body: those that can collide, or `all`: where it has none of these, those it has.
+        meshes: `hull`: geoms of meshes are felt as the convex hulls by which MuJoCo collides with them; `exact`: as
+            they are. What is open is felt as its hull, and what collides with nothing as it is.
         max_edge: Longest edge of a triangle [m]; by default a sixth of each geom's size.
         tolerance: Model only what the scene needs: the fewest elements whose wrench is that of all triangles within
             this share (see `rftsim.reduction`), in the poses and motions that the joints allow, and none of bodies that
-            cannot reach the sand unless they are named in `bodies`. It holds for this sand, law and tree; so a model
-            that is attached to another, or whose sand is tilted later, needs none (None).
+            cannot reach the sand unless they are named in `bodies`. It holds for this sand, law and tree. Zero models
+            every triangle of every body, also for a model that is attached to another, or whose sand is tilted later.
         wheels: Driven wheels, behind which the dynamic laws let the free surface drop: names, whose axis is then that
             of their hinge and whose radius that of their surface; or `Wheel` by name.
-        disable_floor: Take collision from planes at the sand's level, which would support the bodies a second time.
-        allow_open: Accept meshes that are not closed.
         sensors: Add the sensors.
         draw: Draw the free surface as a translucent plane.
         force: `implicit`: the sand's force at the end of each step, which holds at rest and at long steps; `explicit`:
-            at the velocity of the moment, which the integrator RK4 takes in any case.
+            at the velocity of the moment.
         name: Name of the bed, where a model has several.
 
     Returns:
@@ -108,27 +135,25 @@ def add_sand(
     Raises:
         RftsimError: The scene cannot have sand: unknown bodies, surfaces that bound nothing, flags that would skip it.
     """
-    _check_choices(force, geoms, max_edge, tolerance)
+    _check_choices(force, geoms, meshes, max_edge, tolerance)
     bed_sand, bed_law = make_sand(sand), get_law(law)
-    terrain = terrain if isinstance(terrain, FreeSurface) else FreeSurface(height=terrain)
-    numbers = layout.pack_bed(bed_sand, bed_law, terrain, plane)
     check_bed(spec, name)
     draft = make_draft(spec)  # what is checked; the spec itself stays as it is until all is well
-    _check_model(draft.model, bed_sand)
+    _check_model(draft.model)
+    site = _site(spec, draft, terrain)
+    numbers = layout.pack_bed(bed_sand, bed_law, site.terrain, plane)
     choice = Choice(
         bodies=None if bodies is None else frozenset(_names(bodies)),
-        collision_only=geoms == "collision",
-        max_edge=max_edge,
-        allow_open=allow_open,
+        fineness=Fineness(geoms, meshes, max_edge),
         plane=layout.record(numbers, layout.BED).plane if bed_law.planar else None,
-        terrain=terrain if tolerance is not None and bodies is None else None,
+        terrain=site.terrain if tolerance and bodies is None else None,
     )
     felt = felt_bodies(draft.model, choice)
     wheeled = rolling(draft.model, felt.surfaces, wheels if isinstance(wheels, Mapping) else _names(wheels))
     if bed_law.dynamic:
         felt.surfaces.update(wheeled)
-    economies = {} if tolerance is None else economise(draft.model, felt, numbers, tolerance)
-    floors = find_floors(draft.model, felt.surfaces, terrain)
+    economies = economise(draft.model, felt, numbers, tolerance) if tolerance else {}
+    floors = find_floors(draft.model, site.terrain, max(surface.size for surface in felt.surfaces.values()))
     if sensors:
         check_sensors(spec, felt.surfaces)
     if draw:
@@ -139,15 +164,64 @@ def add_sand(
     write_bed(spec, carrier, numbers, felt.surfaces)
     if sensors:
         write_sensors(spec, carrier, felt.surfaces)
-    if disable_floor:
-        disable_floors(spec, floors)
     if draw:
-        write_drawing(spec, name, terrain)
-    notes = [note for surface in felt.surfaces.values() for note in surface.notes]
-    notes += [] if disable_floor else floor_doubts(floors)
-    for note in notes:
-        warnings.warn(note, RftsimWarning, stacklevel=2)
-    return Bed(name, bed_sand, bed_law, terrain, felt.surfaces, felt.reasons, tuple(notes), economies)
+        write_drawing(spec, name, site.terrain)
+    choices = [*felt.choices, *_integrate(spec, force)]
+    if not keep_floor:
+        choices = say_ground(site.ground, floors, remove_floors(spec, floors)) + choices
+    notes = [*felt.doubts, *doubts.gravity_doubts(draft.model, bed_sand)]
+    notes += floor_doubts(floors) if keep_floor else []
+    notes += _standing_doubts(draft.model, numbers, felt, floors)
+    _tell(choices, notes)
+    return Bed(
+        name, bed_sand, bed_law, site.terrain, felt.surfaces, felt.reasons, tuple(choices), tuple(notes), economies
+    )
+
+
+class _Site(NamedTuple):
+    """Where the sand lies."""
+
+    terrain: FreeSurface
+    ground: Ground | None
+    """What the model stands on; None where the caller said where the sand lies, and where there is nothing."""
+
+
+def _site(spec: mujoco.MjSpec, draft: Draft, terrain: "FreeSurface | float | None") -> _Site:
+    """The free surface that was asked for, or that of another bed of the model, or that of its floor, or z = 0."""
+    if terrain is not None:
+        return _Site(terrain if isinstance(terrain, FreeSurface) else FreeSurface(height=terrain), None)
+    for numeric in spec.numerics:
+        if block.SAND_MARKER in numeric.name:
+            other = layout.record(np.array(numeric.data), layout.BED)
+            return _Site(FreeSurface(float(other.offset / other.up[2]), tuple(other.up.tolist())), None)
+    ground = find_ground(draft.model)
+    return _Site(FreeSurface() if ground is None else ground.terrain, ground)
+
+
+def _integrate(spec: mujoco.MjSpec, force: str) -> list[str]:
+    """Take an integrator that takes the implicit force; the line that says so, if it is another than before."""
+    if force != "implicit" or spec.option.integrator != mujoco.mjtIntegrator.mjINT_RK4:
+        return []
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    return ["the integrator is implicitfast now: RK4 would take the sand's force at the velocity of the moment"]
+
+
+def _standing_doubts(model: mujoco.MjModel, bed: Array, felt: Felt, floors: Floors) -> list[str]:
+    """The doubts that show when the model stands in its sand."""
+    packed = {model.body(name).id: layout.pack_surface(surface) for name, surface in felt.surfaces.items()}
+    found = stand(model, start(model), bed, packed)
+    return [
+        *doubts.sinkage_doubts(model, found, felt.surfaces),
+        *doubts.footprint_doubts(model, found, floors.terrain),
+        *carrying(model, found.qpos, floors),
+    ]
+
+
+def _tell(choices: Iterable[str], notes: Iterable[str]) -> None:
+    for sentence in choices:
+        warnings.warn(sentence, RftsimNote, stacklevel=3)
+    for sentence in notes:
+        warnings.warn(sentence, RftsimWarning, stacklevel=3)
 
 
 def load(
@@ -191,19 +265,18 @@ def _names(names: Iterable[str]) -> Iterable[str]:
     return [names] if isinstance(names, str) else names
 
 
-def _check_choices(force: str, geoms: str, max_edge: float | None, tolerance: float | None) -> None:
-    if force not in ("explicit", "implicit"):
-        raise SceneError(f"force must be 'implicit' or 'explicit', not {force!r}")
-    if geoms not in ("collision", "all"):
-        raise SceneError(f"geoms must be 'collision' or 'all', not {geoms!r}")
+def _check_choices(force: str, geoms: str, meshes: str, max_edge: float | None, tolerance: float) -> None:
+    for label, value, kind in (("force", force, Force), ("geoms", geoms, Geoms), ("meshes", meshes, Meshes)):
+        if value not in get_args(kind):
+            raise SceneError(f"{label} must be {' or '.join(map(repr, get_args(kind)))}, not {value!r}")
     if max_edge is not None and not max_edge > 0.0:
         raise SceneError(f"max_edge must be positive, not {max_edge:g}")
-    if tolerance is not None and not 0.0 < tolerance < 1.0:
-        raise SceneError(f"tolerance must lie between 0 and 1, as 0.01 does, not {tolerance:g}")
+    if not 0.0 <= tolerance < 1.0:
+        raise SceneError(f"tolerance must be zero, or below 1 as {TOLERANCE} is, not {tolerance:g}")
 
 
-def _check_model(model: mujoco.MjModel, sand: Sand) -> None:
-    """Refuse flags under which MuJoCo would leave the sand out, and warn of another gravity than the sand's."""
+def _check_model(model: mujoco.MjModel) -> None:
+    """Refuse flags under which MuJoCo would leave the sand out."""
     spring, damper = mujoco.mjtDisableBit.mjDSBL_SPRING, mujoco.mjtDisableBit.mjDSBL_DAMPER
     if model.opt.disableflags & spring and model.opt.disableflags & damper:
         raise SceneError(
@@ -213,12 +286,4 @@ def _check_model(model: mujoco.MjModel, sand: Sand) -> None:
     if model.opt.enableflags & mujoco.mjtEnableBit.mjENBL_SLEEP:
         raise SceneError(
             'the model has <flag sleep="enable"/>, under which sand would pile up on sleeping bodies: disable it'
-        )
-    gravity = float(np.linalg.norm(model.opt.gravity))
-    if abs(gravity - sand.g) > 0.02 * sand.g:
-        warnings.warn(
-            f"the model's gravity is {gravity:.3g} m/s^2 and the sand's strength belongs to {sand.g:.3g}: if the sand "
-            f"is under the model's gravity, pass sand.replace(g={gravity:.4g}), which scales it",
-            RftsimWarning,
-            stacklevel=3,
         )

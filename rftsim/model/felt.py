@@ -9,13 +9,16 @@ import numpy as np
 
 from rftsim.errors import SceneError
 from rftsim.law import layout
-from rftsim.model.geometry import body_surface
+from rftsim.model.geometry import bounding_geoms
 from rftsim.model.reach import clearance, stays_in_plane
+from rftsim.model.shaping import Fineness, Shaping, shape
 from rftsim.sand.free_surface import FreeSurface
 from rftsim.surface.triangles import Array, Surface
 
 CLEAR: Final = 0.1
 """Height over the sand, over the body's size, from which on a body counts as out of reach."""
+FEW: Final = 5
+"""Bodies whose reasons an error tells."""
 
 
 class Choice(NamedTuple):
@@ -23,12 +26,8 @@ class Choice(NamedTuple):
 
     bodies: frozenset[str] | None
     """Names of bodies; None for all that can."""
-    collision_only: bool
-    """Whether geoms that collide with nothing bound no body."""
-    max_edge: float | None
-    """Longest edge of a triangle [m]; None for a sixth of each geom's size."""
-    allow_open: bool
-    """Whether meshes that are not closed are accepted."""
+    fineness: Fineness
+    """Which geoms bound them, and how."""
     plane: Array | None
     """Normal of the plane of motion under a planar law, shape (3,)."""
     terrain: FreeSurface | None
@@ -42,6 +41,10 @@ class Felt(NamedTuple):
     """Surface of each body that feels the sand, by body name."""
     reasons: dict[str, str]
     """Why each body of the model does or does not feel it, by body name."""
+    choices: list[str]
+    """Sentences about how the surfaces were made, one for each kind of choice."""
+    doubts: list[str]
+    """Sentences about what of them is doubtful, one for each kind."""
 
 
 def felt_bodies(model: mujoco.MjModel, choice: Choice) -> Felt:
@@ -49,27 +52,32 @@ def felt_bodies(model: mujoco.MjModel, choice: Choice) -> Felt:
 
     Raises:
         SceneError: A chosen body does not exist or cannot feel the sand, or no body would.
-        SurfaceError: A mesh does not bound a body.
+        SurfaceError: A mesh does not bound a body, nor does its hull.
     """
     names = [model.body(i).name for i in range(model.nbody)]
     _check_chosen(choice.bodies or frozenset(), names)
-    felt = Felt({}, {})
-    for body, name in enumerate(names[1:], 1):
-        if choice.bodies is not None and name not in choice.bodies:
-            felt.reasons[name] = "not among the bodies asked for"
-            continue
-        surface, felt.reasons[name] = _felt_surface(model, body, choice)
+    unfit = {body: _unfit(model, body, names[body], choice) for body in range(1, model.nbody)}
+    shaping = shape(model, [body for body, why in unfit.items() if not why], choice.fineness)
+    felt = Felt({}, {}, shaping.choices, shaping.doubts)
+    for body, why in unfit.items():
+        surface, felt.reasons[names[body]] = (None, why) if why else _felt_surface(model, body, shaping, choice)
         if surface is not None:
-            felt.surfaces[name] = surface.clustered(layout.BLOCK)
-        elif choice.bodies is not None:
-            raise SceneError(f"body {name!r} cannot feel the sand: it {felt.reasons[name]}")
+            felt.surfaces[names[body]] = surface.clustered(layout.BLOCK)
+        elif choice.bodies is not None and names[body] in choice.bodies:
+            raise SceneError(f"body {names[body]!r} cannot feel the sand: it {felt.reasons[names[body]]}")
     if not felt.surfaces:
-        found_none = "; ".join(f"{name}: {why}" for name, why in felt.reasons.items()) or "the model has no bodies"
         raise SceneError(
-            f"no body would feel the sand ({found_none}). Bodies need geoms that collide, or geoms='all'; "
+            f"no body would feel the sand ({_said(felt.reasons)}). Bodies need geoms that collide, or geoms='all'; "
             '<compiler discardvisual="true"/> deletes the others'
         )
     return felt
+
+
+def _said(reasons: dict[str, str]) -> str:
+    """The reasons of the first few bodies."""
+    told = [f"{name}: {why}" for name, why in reasons.items()]
+    more = [f"and {len(told) - FEW} more"] if len(told) > FEW else []
+    return "; ".join(told[:FEW] + more) or "the model has no bodies"
 
 
 def _check_chosen(chosen: frozenset[str], names: list[str]) -> None:
@@ -80,21 +88,24 @@ def _check_chosen(chosen: frozenset[str], names: list[str]) -> None:
         raise SceneError(f"{names[0]!r} is the world, which cannot move: name bodies that can")
 
 
-def _felt_surface(model: mujoco.MjModel, body: int, choice: Choice) -> tuple[Surface | None, str]:
-    """The part of a body's surface that feels the sand, None where nothing does, and why."""
+def _unfit(model: mujoco.MjModel, body: int, name: str, choice: Choice) -> str:
+    """Why a body cannot feel the sand, whatever its surface; empty where it can."""
+    if choice.bodies is not None and name not in choice.bodies:
+        return "not among the bodies asked for"
     if model.body_weldid[body] == 0:
-        return None, "cannot move"
+        return "cannot move"
     if model.body_plugin[body] >= 0:
-        return None, "has another plugin, or sand already"
-    surface = body_surface(
-        model,
-        body,
-        collision_only=choice.collision_only,
-        max_edge=choice.max_edge,
-        allow_open=choice.allow_open,
-    )
+        return "has another plugin, or sand already"
+    if not bounding_geoms(model, body, choice.fineness.geoms):
+        return "has no geom that collides" if model.body_geomnum[body] else "has no geom"
+    return ""
+
+
+def _felt_surface(model: mujoco.MjModel, body: int, shaping: Shaping, choice: Choice) -> tuple[Surface | None, str]:
+    """The part of a body's surface that feels the sand, None where nothing does, and why."""
+    surface = shaping.surfaces.get(body)
     if surface is None:
-        return None, "has no geom that collides" if model.body_geomnum[body] else "has no geom"
+        return None, "lies inside bodies that it is fixed to"
     if choice.terrain is not None:
         above = clearance(model, body, surface, choice.terrain)
         if above > CLEAR * surface.size:

@@ -1,47 +1,190 @@
-"""Floors beneath sand: what would support the bodies a second time, because MuJoCo lets them collide with it."""
+"""The floor that a model stands on: where it lies, so that the sand takes its place, and how it stops carrying."""
 
 from collections.abc import Iterable, Mapping
+from typing import Any, Final, NamedTuple
 
 import mujoco
+import numpy as np
 
 from rftsim.model.draft import geom_of, shown
-from rftsim.model.geometry import is_colliding
+from rftsim.model.geometry import colliding
+from rftsim.model.start import standing_trees, start
+from rftsim.model.tops import LEVEL, Top, relief, top_at
 from rftsim.sand.free_surface import FreeSurface
-from rftsim.surface.triangles import Surface
+from rftsim.surface.triangles import Array
 
 _GEOM = mujoco.mjtGeom
+FLUSH: Final = 2e-3
+"""Distance from the sand's surface within which a face counts as part of it [m]."""
+FEW: Final = 3
+"""Names that a line tells before it counts the others."""
 
 
-def find_floors(model: mujoco.MjModel, surfaces: Mapping[str, Surface], terrain: FreeSurface) -> dict[str, float]:
-    """Depths of colliding planes and height fields near the terrain by their names [m], positive below it.
+class Ground(NamedTuple):
+    """The geom that a model stands on, and where its top lies."""
 
-    Near is nearer than the largest body that feels the sand is long; those of bodies that can move are no floors.
+    geom: int
+    """Id of the geom."""
+    terrain: FreeSurface
+    """The plane of its top where the model stands."""
+    relief: float
+    """Difference in height over the geom, which the plane leaves out [m]."""
+
+
+class Floors(NamedTuple):
+    """Static geoms that would carry the bodies a second time, or hide the sand, by their names in the draft."""
+
+    terrain: FreeSurface
+    """The sand's surface."""
+    depths: dict[str, float]
+    """Depth below the sand's surface of those that collide [m]."""
+    drawn: list[str]
+    """Those that are only drawn in the sand's surface."""
+
+
+def find_ground(model: mujoco.MjModel) -> Ground | None:
+    """Find the geom that a model's heaviest tree stands on at the start: the highest top below its centre of mass.
+
+    Trees that can fall count first, and then those whose base is fixed; where nothing lies below, the nearest above.
     """
-    reach = max(surface.size for surface in surfaces.values())
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    found = {}
-    for geom in range(model.ngeom):
-        kind = _GEOM(model.geom_type[geom])
-        if kind not in (_GEOM.mjGEOM_PLANE, _GEOM.mjGEOM_HFIELD) or not is_colliding(model, geom):
+    data = start(model)
+    candidates = _static(model, can_touch(model))
+    moving = [body for body in range(1, model.nbody) if model.body_weldid[body] == body]
+    for root in [*standing_trees(model), *moving]:
+        place = data.subtree_com[root]
+        tops = {geom: top for geom in candidates if (top := top_at(model, data, geom, place)) is not None}
+        if tops:
+            below = {geom: top for geom, top in tops.items() if top.height <= place[2]}
+            geom = max(below, key=lambda g: below[g].height) if below else min(tops, key=lambda g: tops[g].height)
+            return Ground(geom, _plane(tops[geom], place), relief(model, geom))
+    return None
+
+
+def _plane(top: Top, place: Array) -> FreeSurface:
+    """The plane through a top at a place."""
+    normal = np.where(np.abs(top.normal) < 1e-9, 0.0, top.normal)
+    at = np.array([place[0], place[1], top.height])
+    height = float(normal @ at / normal[2])
+    return FreeSurface(round(height, 12) + 0.0, tuple(normal.tolist()))
+
+
+def can_touch(model: mujoco.MjModel) -> "np.ndarray[Any, np.dtype[np.bool_]]":
+    """Whether each geom can collide with a geom that moves, by bits or by a contact pair, shape (ngeom,)."""
+    moves = model.body_weldid[model.geom_bodyid] != 0
+    types, affinities = model.geom_contype, model.geom_conaffinity
+    bits = {(int(t), int(a)) for t, a in zip(types[moves], affinities[moves], strict=True)}
+    touches = np.zeros(model.ngeom, dtype=bool)
+    for contype, conaffinity in bits:
+        touches |= ((types & conaffinity) != 0) | ((affinities & contype) != 0)
+    for one, other in ((model.pair_geom1, model.pair_geom2), (model.pair_geom2, model.pair_geom1)):
+        touches[one[moves[other]]] = True
+    return touches
+
+
+def _static(model: mujoco.MjModel, among: Any) -> list[int]:
+    """Those among the geoms that nothing moves, mocap bodies included."""
+    held = (model.body_weldid == 0) & (model.body_mocapid[model.body_rootid] < 0)
+    return np.flatnonzero(held[model.geom_bodyid] & among).tolist()
+
+
+def find_floors(model: mujoco.MjModel, terrain: FreeSurface, reach: float) -> Floors:
+    """The floors of a model near the terrain.
+
+    Planes and height fields are floors where they are nearer than the reach above or below it. Others have edges: those
+    that stand out of the sand are obstacles, and stay.
+
+    Args:
+        model: Compiled.
+        terrain: Surface of the sand.
+        reach: Size of the largest body that feels the sand [m].
+    """
+    data = start(model)
+    trees = standing_trees(model)
+    place = data.subtree_com[trees[0]] if trees else np.zeros(3)
+    endless = (_GEOM.mjGEOM_PLANE, _GEOM.mjGEOM_HFIELD)
+    collides, depths, drawn = colliding(model), {}, []
+    for geom in _static(model, np.ones(model.ngeom, dtype=bool)):
+        kind, name = _GEOM(model.geom_type[geom]), model.geom(geom).name
+        at = place if kind == _GEOM.mjGEOM_PLANE else data.geom_xpos[geom]
+        top = top_at(model, data, geom, at)
+        if top is None:
             continue
-        depth = float(terrain.depth(data.geom_xpos[geom]))
-        if model.body_weldid[model.geom_bodyid[geom]] == 0 and abs(depth) <= reach:
-            found[model.geom(geom).name] = depth
-    return found
+        depth = float(terrain.depth([at[0], at[1], top.height]))
+        if collides[geom] and abs(depth) <= reach and (kind in endless or depth >= -FLUSH):
+            depths[name] = depth
+        elif not collides[geom] and abs(depth) <= FLUSH and top.normal @ terrain.normal > 1.0 - 1e-6:
+            drawn.append(name)
+    return Floors(terrain, depths, drawn)
 
 
-def disable_floors(spec: mujoco.MjSpec, floors: Iterable[str]) -> None:
-    """Take collision from floors, given by their names in the draft."""
-    for floor in floors:
-        geom = geom_of(spec, floor)
+def remove_floors(spec: mujoco.MjSpec, floors: Floors) -> int:
+    """Take collision from floors, pairs included, and hide them; returns how many pairs went."""
+    for name in (*floors.depths, *floors.drawn):
+        geom = geom_of(spec, name)
         geom.contype = geom.conaffinity = 0
+        geom.rgba = [0.0, 0.0, 0.0, 0.0]
+    pairs = [pair for pair in spec.pairs if {pair.geomname1, pair.geomname2} & floors.depths.keys()]
+    for pair in pairs:
+        spec.delete(pair)
+    return len(pairs)
 
 
-def floor_doubts(floors: Mapping[str, float]) -> list[str]:
-    """Warnings of floors that stay as they are, one sentence or two for each."""
+def say_ground(ground: Ground | None, floors: Floors, pairs: int) -> list[str]:
+    """The line that says whose place the sand takes."""
+    if not floors.depths:
+        return []
+    terrain = floors.terrain
+    more = f", nor do its {pairs} contact pairs" if pairs else ""
+    tilt = f", tilted by {np.degrees(np.arccos(terrain.normal[2])):.3g} degrees" if terrain.normal[2] < 1.0 else ""
+    flat = f", flat although that has {ground.relief:.3g} m of relief" if ground is not None and ground.relief else ""
     return [
-        f"{shown(floor)} lies {depth:.3g} m below the sand's surface and collides: it supports the bodies a "
-        "second time. Take its collision away (disable_floor=True) or lower it"
-        for floor, depth in floors.items()
+        f"the sand lies at z = {terrain.height:.6g} m{tilt}{flat}, in the place of {_list(floors.depths)}, which no "
+        f"longer collides and is hidden{more} (keep_floor=True keeps it)"
+    ]
+
+
+def floor_doubts(floors: Floors) -> list[str]:
+    """The warning of floors that were kept, if there are any."""
+    if not floors.depths:
+        return []
+    depth = min(floors.depths.values(), key=abs)
+    return [
+        f"{_list(floors.depths)} lies {depth:.3g} m below the sand's surface and collides: it supports the bodies a "
+        "second time. Let the sand take its place (keep_floor=False) or lower it"
+    ]
+
+
+def _list(names: Mapping[str, Any] | Iterable[str]) -> str:
+    told = [shown(name) for name in names]
+    return " and ".join([", ".join(told[:FEW]), f"{len(told) - FEW} more"] if len(told) > FEW else [", ".join(told)])
+
+
+def carrying(model: mujoco.MjModel, qpos: Array, floors: Floors) -> list[str]:
+    """The warning of static geoms that still carry bodies at the sand's level, by their contacts, if there are any.
+
+    Args:
+        model: Compiled; the floors stop colliding in it.
+        qpos: Positions at which it stands in the sand, shape (nq,).
+        floors: Those that are known.
+    """
+    gone, terrain = [model.geom(name).id for name in floors.depths], floors.terrain
+    model.geom_contype[gone] = model.geom_conaffinity[gone] = 0
+    data = mujoco.MjData(model)
+    data.qpos[:] = qpos
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    mujoco.mj_collision(model, data)
+    static, found = set(_static(model, np.ones(model.ngeom, dtype=bool))) - set(gone), {}
+    for contact in data.contact:
+        pair = {int(g) for g in contact.geom}
+        if len(pair & static) != 1 or pair & set(gone) or abs(contact.frame[:3] @ terrain.normal) < LEVEL:
+            continue
+        (geom,), (other,) = pair & static, pair - static
+        if model.body_weldid[model.geom_bodyid[other]] != 0 and terrain.depth(contact.pos) >= -FLUSH:
+            found[model.geom(geom).name] = model.body(model.geom_bodyid[other]).name
+    if not found:
+        return []
+    return [
+        f"{_list(found)} still carries body {next(iter(found.values()))} at the sand's level, beside the sand: move "
+        "it, or take its collision away"
     ]

@@ -1,47 +1,52 @@
-"""Surfaces of a MuJoCo model's bodies: their geoms as checked triangles."""
+"""Surfaces of a MuJoCo model's geoms: primitives, convex hulls of meshes, or the meshes themselves, as triangles."""
+
+from typing import Any, Final, Literal, NamedTuple
 
 import mujoco
 import numpy as np
 
-from rftsim.errors import SceneError
+from rftsim.errors import SceneError, SurfaceError
 from rftsim.model.draft import TEMPORARY
 from rftsim.surface import solids
-from rftsim.surface.triangles import EDGE_ON_SINGLE, Array, Faces, Surface, joined, make_surface
+from rftsim.surface.triangles import EDGE_ON_SINGLE, Array, Faces, Surface, is_closed, make_surface
+
+Meshes = Literal["hull", "exact"]
+"""How the meshes of geoms are felt: as the convex hulls that MuJoCo collides with, or as they are where closed."""
+MESHES: Final[tuple[Meshes, ...]] = ("hull", "exact")
+Geoms = Literal["collision", "all"]
+"""Which geoms bound a body: those that can collide, or, where a body has none of these, all that it has."""
 
 _GEOM = mujoco.mjtGeom
 _SECTIONS = 24
-FINENESS = 6
-"""Edges of a geom's triangles are at most its size over this, unless the caller says otherwise."""
+LARGER: Final = 1.25
+"""Volume of a hull over that of its mesh from which on the difference is said."""
 
 
-def body_surface(
-    model: mujoco.MjModel, body: int, *, collision_only: bool, max_edge: float | None, allow_open: bool
-) -> Surface | None:
-    """The surface of a body's geoms in the body frame, or None where it has none.
+class Part(NamedTuple):
+    """A geom's surface in its body's frame."""
 
-    Args:
-        model: A compiled model.
-        body: The body's id.
-        collision_only: Leave out geoms that collide with nothing.
-        max_edge: Longest edge of a triangle [m]; None for a sixth of each geom's size.
-        allow_open: Accept meshes that are not closed.
-
-    Raises:
-        SurfaceError: A mesh does not bound a body.
-        SceneError: A geom has no surface that the sand could press on.
-    """
-    surfaces = []
-    for geom in range(model.body_geomadr[body], model.body_geomadr[body] + model.body_geomnum[body]):
-        if collision_only and not is_colliding(model, geom):
-            continue
-        surface = _geom_surface(model, geom, allow_open)
-        surfaces.append(surface.refined(surface.size / FINENESS if max_edge is None else max_edge))
-    return joined(surfaces) if surfaces else None
+    geom: int
+    """The geom's id."""
+    surface: Surface
+    """Its triangles, closed."""
+    hull: bool
+    """Whether they are the convex hull of a mesh."""
+    excess: float
+    """Volume of the hull over that of the mesh, NaN where the mesh is open, 1 where there is no hull [-]."""
 
 
-def is_colliding(model: mujoco.MjModel, geom: int) -> bool:
-    """Whether a geom can collide with anything at all."""
-    return bool(model.geom_contype[geom] or model.geom_conaffinity[geom])
+def colliding(model: mujoco.MjModel) -> "np.ndarray[Any, np.dtype[np.bool_]]":
+    """Whether each geom can collide with anything at all, by its bits or by a contact pair, shape (ngeom,)."""
+    can = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
+    can[model.pair_geom1] = can[model.pair_geom2] = True
+    return can  # type: ignore[no-any-return]
+
+
+def bounding_geoms(model: mujoco.MjModel, body: int, geoms: Geoms) -> list[int]:
+    """The ids of the geoms that bound a body."""
+    own = range(model.body_geomadr[body], model.body_geomadr[body] + model.body_geomnum[body])
+    found = [geom for geom in own if colliding(model)[geom]]
+    return found or (list(own) if geoms == "all" else [])
 
 
 def geom_label(model: mujoco.MjModel, geom: int) -> str:
@@ -68,15 +73,75 @@ def geom_triangles(model: mujoco.MjModel, geom: int) -> tuple[Array, Faces]:
     return _primitive(kind, model.geom_size[geom], geom_label(model, geom))
 
 
-def _geom_surface(model: mujoco.MjModel, geom: int, allow_open: bool) -> Surface:
-    label = geom_label(model, geom)
-    if model.geom_type[geom] == int(_GEOM.mjGEOM_MESH):
-        label += f" (mesh {model.mesh(model.geom_dataid[geom]).name})"
+def geom_part(model: mujoco.MjModel, geom: int, as_hull: bool) -> Part:
+    """The surface of a geom, where a mesh is taken as its convex hull if so asked, or if it is open.
+
+    Raises:
+        SurfaceError: A mesh does not bound a body, nor does its hull.
+        SceneError: The geom has no surface that the sand could press on.
+    """
+    label, hull, excess = geom_label(model, geom), False, 1.0
     vertices, faces = geom_triangles(model, geom)
-    surface = make_surface(vertices, faces, name=label, allow_open=allow_open, edge_on=EDGE_ON_SINGLE)
+    if model.geom_type[geom] != int(_GEOM.mjGEOM_MESH):
+        surface: Surface | None = make_surface(vertices, faces, name=label, edge_on=EDGE_ON_SINGLE)
+    else:
+        mesh = int(model.geom_dataid[geom])
+        label += f" (mesh {model.mesh(mesh).name})"
+        surface = None if as_hull else _closed(vertices, faces, label)
+        hull = surface is None
+    if surface is None:
+        corners = hull_triangles(model, mesh)
+        surface = make_surface(*_faces(corners), name=label, edge_on=EDGE_ON_SINGLE)
+        excess = _excess(solids.volume(surface.triangles), vertices, faces)
     rotation = np.empty(9)
     mujoco.mju_quat2Mat(rotation, model.geom_quat[geom])
-    return surface.moved(rotation.reshape(3, 3), model.geom_pos[geom])
+    return Part(geom, surface.moved(rotation.reshape(3, 3), model.geom_pos[geom]), hull, excess)
+
+
+def _excess(hull: float, vertices: Array, faces: Faces) -> float:
+    """Volume of a hull [m^3] over that of its mesh [-]; NaN where the mesh is so open that it matters."""
+    inside = abs(solids.volume(vertices[faces]))
+    if hull < LARGER * inside:
+        return hull / inside
+    return hull / inside if inside > 0.0 and is_closed(faces) else float("nan")
+
+
+def _closed(vertices: Array, faces: Faces, label: str) -> Surface | None:
+    """The surface of a mesh as it is; None where it bounds no body."""
+    try:
+        return make_surface(vertices, faces, name=label, edge_on=EDGE_ON_SINGLE)
+    except SurfaceError:
+        return None
+
+
+def hull_triangles(model: mujoco.MjModel, mesh: int) -> Array:
+    """The convex hull of a mesh, as MuJoCo collides with it where it made one [m], outward, shape (nface, 3, 3).
+
+    Raises:
+        SurfaceError: The mesh is flat.
+    """
+    vertices = model.mesh_vert[model.mesh_vertadr[mesh] :][: model.mesh_vertnum[mesh]].astype(float)
+    start = int(model.mesh_graphadr[mesh])
+    if start < 0:
+        faces = _convex_hull(vertices, model.mesh(mesh).name)
+    else:  # MuJoCo's layout: two counts, edge addresses and vertex ids, edges, and then the faces
+        nvert, nface = model.mesh_graph[start : start + 2].tolist()
+        first = start + 2 + 2 * nvert + nvert + 3 * nface
+        faces = model.mesh_graph[first : first + 3 * nface].reshape(-1, 3).astype(int)
+    corners: Array = vertices[faces]
+    a, b, c = np.moveaxis(corners, 1, 0)
+    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), a - corners.mean(axis=(0, 1))) < 0.0
+    corners[inward] = corners[inward][:, ::-1]
+    return corners
+
+
+def _convex_hull(vertices: Array, name: str) -> Faces:
+    from scipy.spatial import ConvexHull, QhullError  # not at start-up, which it would slow by half a second
+
+    try:
+        return ConvexHull(vertices).simplices.astype(int)  # type: ignore[no-any-return]
+    except QhullError:
+        raise SurfaceError(f"mesh {name} is flat, so that its hull bounds no body: give it a thickness") from None
 
 
 def _primitive(kind: mujoco.mjtGeom, size: Array, label: str) -> tuple[Array, Faces]:

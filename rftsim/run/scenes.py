@@ -9,7 +9,7 @@ import mujoco
 from rftsim_models import intruder, wheels
 
 from rftsim.errors import SceneError
-from rftsim.model.add_sand import Bed, add_sand, read_spec
+from rftsim.model.add_sand import WHOLE, Bed, add_sand, read_spec
 from rftsim.sand.medium import Sand
 from rftsim.sand.presets import PRESETS
 from rftsim.surface.triangles import Wheel, load_surface
@@ -161,7 +161,7 @@ def stage(
         settings: Changes of the scene's settings.
         timestep: Time step instead of the model's [s].
         duration: Duration instead of the scene's [s].
-        **options: Further options of `add_sand`.
+        **options: Further options of `add_sand`; None stands for its own choice, or the scene's.
 
     Raises:
         RftsimError: No such scene, file or setting, or the scene cannot have sand.
@@ -171,6 +171,7 @@ def stage(
         spec = _read(name, settings or {})
     else:
         spec, wheel = _built(name, scene, _chosen(name, scene.settings, settings or {}))
+        options = {**WHOLE, **_given(options)}
     _check_positive("timestep", timestep)
     _check_positive("duration", duration)
     if timestep is not None:
@@ -181,7 +182,7 @@ def stage(
             options["wheels"] = {wheels.WHEEL: Wheel((0, 1, 0), (0, 0, 0), wheel.outer_radius)}
     if sand is None:
         sand = scene.sand if scene else POPPY
-    bed = add_sand(spec, sand, law or (scene.law if scene else FILE_LAW), **options)
+    bed = add_sand(spec, sand, law or (scene.law if scene else FILE_LAW), **_given(options))
     if scene is None:
         measured = Measured(next(iter(bed.surfaces)), None)
     elif wheel is None:
@@ -189,6 +190,10 @@ def stage(
     else:
         measured = Measured(wheels.WHEEL, wheel.outer_radius)
     return Staged(spec.compile(), bed, measured, duration or (scene.duration if scene else FILE_DURATION))
+
+
+def _given(options: Mapping[str, Any]) -> dict[str, Any]:
+    return {option: value for option, value in options.items() if value is not None}
 
 
 def _read(name: str, settings: Mapping[str, str]) -> mujoco.MjSpec:

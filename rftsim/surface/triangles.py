@@ -151,7 +151,7 @@ def make_surface(
     corners = np.asarray(faces, dtype=int).reshape(-1, 3)
     _check_faces(points, corners, name)
     notes: list[str] = []
-    points, corners = _merged(points, corners)
+    points, corners = welded(points, corners)
     extent = float(np.linalg.norm(np.ptp(points, axis=0)))
     areas = np.linalg.norm(np.cross(*_edges(points[corners])), axis=1) / 2.0
     corners = _kept(corners, areas > 1e-14 * extent**2, f"{name}: dropped %d faces of no area", notes)
@@ -223,7 +223,7 @@ def _point(x: ArrayLike) -> str:
     return "(" + ", ".join(f"{value:.4g}" for value in np.asarray(x)) + ")"
 
 
-def _merged(points: Array, faces: Faces) -> tuple[Array, Faces]:
+def welded(points: Array, faces: Faces) -> tuple[Array, Faces]:
     """Vertices that faces have, none twice, to 1e-8, and the faces on them."""
     used, faces = np.unique(faces, return_inverse=True)
     points = points[used]
@@ -310,6 +310,11 @@ def _cyclic(faces: Faces) -> Faces:
     """Faces rotated so that the smallest vertex comes first, which leaves the winding."""
     start = np.argmin(faces, axis=1)[:, None]
     return np.take_along_axis(faces, (start + np.arange(3)) % 3, axis=1)
+
+
+def is_closed(faces: Faces) -> bool:
+    """Whether each directed edge of faces, shape (nface, 3), has its opposite."""
+    return _open_face(faces) is None
 
 
 def _open_face(faces: Faces) -> int | None:

@@ -12,7 +12,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from rftsim_models.wheels import FOUR_FLAP_RUNNER, GROUSER_WHEEL, SERVO, WHEEL, WheelParameters, build_wheel
 
-from rftsim.model.add_sand import add_sand
+from rftsim.model.add_sand import WHOLE, add_sand
 from rftsim.run.run import STEADY, run
 from rftsim.run.scenes import POPPY, Staged
 from rftsim.run.scenes import Measured as MeasuredBy
@@ -96,7 +96,7 @@ def simulate(case: Case, scale: Scale) -> dict[str, float]:
     spec.option.timestep = TIMESTEP * time
     sand = POPPY.replace(g=q * POPPY.g, lambda_=case.lambda_)
     wheels = {WHEEL: Wheel((0, 1, 0), (0, 0, 0), wheel.outer_radius)} if case.structural else {}
-    bed = add_sand(spec, sand, case.law, max_edge=2 * wheel.width, wheels=wheels)
+    bed = add_sand(spec, sand, case.law, max_edge=2 * wheel.width, wheels=wheels, **WHOLE)
     duration = TURNS * 60.0 / case.rpm / STEADY * time
     done = run(Staged(spec.compile(), bed, MeasuredBy(WHEEL, wheel.outer_radius), duration))
     last = slice(int(len(done.history.time) * (1 - STEADY)), None)

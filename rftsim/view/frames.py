@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from rftsim.model.geometry import body_surface, is_colliding
+from rftsim.model.geometry import MESHES, bounding_geoms
 from rftsim.model.readout import Instance, body_velocities, instances, tractions, wrenches
+from rftsim.model.shaping import Fineness, body_surface
 from rftsim.surface.triangles import Array
 
 
@@ -109,13 +110,12 @@ def describe(model: mujoco.MjModel) -> Portrait:
 
 
 def _make_skin(model: mujoco.MjModel, start: mujoco.MjData, body: int) -> Skin:
-    """Find the geoms that have the area of what feels the sand, and take their corners: `tractions` has none."""
+    """Take the corners of what feels the sand from its geoms, as they are or as hulls: `tractions` has none."""
     felt = tractions(model, start, body)
     area = float(felt.area.sum())
-    own = range(model.body_geomadr[body], model.body_geomadr[body] + model.body_geomnum[body])
-    for collision_only in (True, False):
-        drawn = body_surface(model, body, collision_only=collision_only, max_edge=None, allow_open=True)
-        geoms = [geom for geom in own if is_colliding(model, geom) or not collision_only]
+    geoms = bounding_geoms(model, body, "all")
+    for meshes in MESHES:
+        drawn = body_surface(model, body, Fineness("all", meshes))
         if drawn is not None and np.isclose(drawn.areas.sum(), area, rtol=0.05):  # facets have a little less
             break
     assert drawn is not None, "a body that feels sand has geoms"

@@ -10,8 +10,8 @@ from trees import SAND, spec_of, xml
 
 import rftsim
 from rftsim import FreeSurface, SceneError, add_sand
-from rftsim.model.geometry import body_surface
 from rftsim.model.reach import clearance, sampled_reach
+from rftsim.model.shaping import Fineness, body_surface
 from rftsim.run.advice import advise
 from rftsim.run.scenes import stage
 
@@ -35,7 +35,7 @@ LEVEL = FreeSurface()
 
 
 def surface_of(model, name):
-    return body_surface(model, model.body(name).id, collision_only=True, max_edge=None, allow_open=False)
+    return body_surface(model, model.body(name).id, Fineness())
 
 
 @pytest.mark.parametrize(
@@ -80,9 +80,9 @@ def test_no_pose_within_the_ranges_comes_nearer():
 
 
 def test_a_tolerance_leaves_out_what_cannot_reach_the_sand():
-    """Without it every moving body is modelled; with it those out of reach are not, unless they are named."""
+    """At zero every moving body is modelled; otherwise those out of reach are not, unless they are named."""
     moving = {"crane", "jib", "hook", "lamp", "lift", "rope", "cart", "block"}
-    assert set(add_sand(spec_of(CRANE), SAND).surfaces) == moving
+    assert set(add_sand(spec_of(CRANE), SAND, tolerance=0.0).surfaces) == moving
     bed = add_sand(spec_of(CRANE), SAND, tolerance=0.2)
     assert set(bed.surfaces) == {"hook", "rope", "block"}
     assert bed.reasons["lift"] == "stays 0.57 m or more above the sand, by its tree and its joints' ranges"
@@ -96,10 +96,10 @@ def test_nothing_within_reach_is_an_error():
         add_sand(spec_of('<body pos="0 0 2"><joint axis="0 0 1"/><geom size=".1"/></body>'), SAND, tolerance=0.1)
 
 
-@pytest.mark.parametrize("tolerance", [0.0, -0.1, 1.0, np.nan])
+@pytest.mark.parametrize("tolerance", [-0.1, 1.0, np.nan])
 def test_tolerances_that_cannot_be(tolerance):
     """It is a share."""
-    with pytest.raises(SceneError, match="tolerance must lie between 0 and 1"):
+    with pytest.raises(SceneError, match="tolerance must be zero, or below 1"):
         add_sand(spec_of(), SAND, tolerance=tolerance)
 
 
@@ -124,7 +124,7 @@ def test_a_free_body_goes_everywhere():
 def test_a_model_under_a_tolerance_is_a_model():
     """Fewer elements, near the same force; readouts and the bounding box follow."""
     drop = xml('<body name="b" pos="0 0 .03"><freejoint/><geom type="ellipsoid" size=".1 .06 .05"/></body>')
-    models = [rftsim.load(drop, SAND, max_edge=0.004, tolerance=tolerance) for tolerance in (None, 0.05)]
+    models = [rftsim.load(drop, SAND, max_edge=0.004, tolerance=tolerance) for tolerance in (0.0, 0.05)]
     counts, rest = [], []
     for model in models:
         data = mujoco.MjData(model)
@@ -159,7 +159,7 @@ def test_laws_for_a_wheel(scene, law, rpm, advised):
 def test_laws_for_a_robot(speed, law, number):
     """A free robot needs a 3D law; its speed, v / sqrt(g L) of its smallest body, decides on the dynamic terms."""
     spec = hexapod.build_hexapod()
-    bed = add_sand(spec)
+    bed = add_sand(spec, tolerance=0.0)
     dimensions, dynamics = advise(spec.compile(), bed, speed)
     assert dimensions.law == "rft3d"
     assert dynamics.law == law
@@ -169,7 +169,7 @@ def test_laws_for_a_robot(speed, law, number):
 def test_a_flat_law_in_space_is_advised_against():
     """A 2D law does not feel what moves across its plane."""
     spec = spec_of()
-    bed = add_sand(spec, SAND, "rft2d")
+    bed = add_sand(spec, SAND, "rft2d", tolerance=0.0)
     assert [one.law for one in advise(spec.compile(), bed)] == ["rft3d", "rft2d"]
 
 

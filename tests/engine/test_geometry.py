@@ -6,7 +6,7 @@ import pytest
 from shapes import about
 from trees import BALL, SAND, sandy, shaken, spec_of
 
-from rftsim import FreeSurface, RftsimWarning, SceneError, SurfaceError, add_sand, instances, tractions, wrenches
+from rftsim import FreeSurface, SceneError, add_sand, instances, tractions, wrenches
 from rftsim.surface.triangles import Wheel
 
 WHEEL = """
@@ -19,7 +19,7 @@ WHEEL = """
 
 
 def bed_of(mjcf, option="", sand=SAND, law="rft3d", **options):
-    return add_sand(spec_of(mjcf, option), sand, law, **options)
+    return add_sand(spec_of(mjcf, option), sand, law, **{"tolerance": 0.0} | options)
 
 
 # Surfaces -------------------------------------------------------------------------------------------------------------
@@ -31,7 +31,7 @@ def test_surface_is_that_of_the_geoms():
     sizes = {"sphere": ".1", "box": ".1 .2 .05", "ellipsoid": ".1 .2 .05", "cylinder": ".1 .2", "capsule": ".1 .2"}
     for kind, size in sizes.items():
         spec = spec_of(f'<body name="b"><freejoint/><geom type="{kind}" size="{size}" {place}/></body>')
-        surface, model = add_sand(spec, SAND).surfaces["b"], spec.compile()
+        surface, model = add_sand(spec, SAND, tolerance=0.0).surfaces["b"], spec.compile()
         vector = surface.normals * surface.areas[:, None]
         np.testing.assert_allclose(vector.sum(axis=0), 0.0, atol=1e-12)
         volume = np.einsum("ij,ij->", surface.centres, vector) / 3.0
@@ -52,18 +52,6 @@ def test_mesh_geoms_keep_their_place(tmp_path):
     points = surface.triangles.reshape(-1, 3)
     np.testing.assert_allclose(points.min(axis=0), expected.min(axis=0), atol=1e-6)
     np.testing.assert_allclose(points.max(axis=0), expected.max(axis=0), atol=1e-6)
-
-
-def test_open_meshes_are_refused_unless_allowed():
-    """An open mesh is an error that names the mesh, and with allow_open a warning."""
-    mesh = (
-        '<asset><mesh name="bowl" vertex="0 0 0 1 0 0 0 1 0 0 0 1" face="0 2 1 0 1 3 1 2 3" inertia="shell"/></asset>'
-    )
-    body = '<body name="b"><freejoint/><geom type="mesh" mesh="bowl" mass="1"/></body>'
-    with pytest.raises(SurfaceError, match=r"bowl.*open"):
-        bed_of(body, mesh)
-    with pytest.warns(RftsimWarning, match="open"):
-        assert "open" in bed_of(body, mesh, allow_open=True).notes[0]
 
 
 @pytest.mark.parametrize("edge", [0.02, 0.05])

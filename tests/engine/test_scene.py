@@ -2,7 +2,6 @@
 
 import re
 
-import mujoco
 import numpy as np
 import pytest
 from trees import BALL, SAND, sandy, shaken, spec_of, xml
@@ -22,7 +21,7 @@ CAST = (
 
 
 def bed_of(mjcf, option="", sand=SAND, law="rft3d", **options):
-    return add_sand(spec_of(mjcf, option), sand, law, **options)
+    return add_sand(spec_of(mjcf, option), sand, law, **{"tolerance": 0.0} | options)
 
 
 # Which bodies ---------------------------------------------------------------------------------------------------------
@@ -41,8 +40,10 @@ def test_bodies_that_move_and_collide_feel_the_sand():
 
 
 def test_visual_geoms_on_request():
-    """geoms="all" takes the geoms that do not collide too."""
+    """geoms="all" takes geoms that do not collide where a body has no others, and none beside those that do."""
     assert "ghost" in bed_of(CAST, geoms="all").surfaces
+    cloak = BALL.replace("</body>", '<geom type="box" size=".05 .05 .05" contype="0" conaffinity="0"/></body>')
+    assert bed_of(cloak, geoms="all").surfaces["ball"].ntri == bed_of(BALL).surfaces["ball"].ntri
 
 
 def test_chosen_bodies():
@@ -89,46 +90,12 @@ def test_body_with_another_plugin():
     add_sand(spec, SAND, bodies=["ball"])
     with pytest.raises(SceneError, match="give this bed another name"):
         add_sand(spec, SAND)
-    bed = add_sand(spec, SAND, name="second")
+    bed = add_sand(spec, SAND, name="second", tolerance=0.0)
     assert list(bed.surfaces) == ["arm", "shell"]
     assert bed.reasons["ball"] == "has another plugin, or sand already"
 
 
-# Floors and flags -----------------------------------------------------------------------------------------------------
-
-
-def test_floors_are_warned_of():
-    """A plane at the sand's level that collides supports the bodies a second time."""
-    with pytest.warns(RftsimWarning, match="floor.*second time"):
-        assert len(bed_of(FLOOR + BALL).notes) == 1
-
-
-def test_floors_can_be_disabled():
-    """disable_floor takes the floor's collision, and nobody else's."""
-    spec = spec_of(FLOOR + BALL + '<geom name="wall" type="box" size="1 1 1" pos="9 0 0"/>')
-    assert add_sand(spec, SAND, disable_floor=True).notes == ()
-    model = spec.compile()
-    collides = {model.geom(i).name: bool(model.geom_contype[i]) for i in range(model.ngeom)}
-    assert collides == {"floor": False, "": True, "wall": True, "sand_surface": False}
-
-
-def test_floors_far_below_are_let_be():
-    """A floor deeper than the bodies are large is the container's."""
-    assert bed_of(FLOOR.replace("size", 'pos="0 0 -1" size') + BALL).notes == ()
-
-
-def test_floors_can_be_disabled_beside_discarded_visuals():
-    """The floor is found although <compiler discardvisual> deletes a geom before it."""
-    shade = '<geom name="shade" type="box" size="1 1 1" contype="0" conaffinity="0"/>'
-    spec = spec_of(shade + FLOOR + BALL, '<compiler discardvisual="true"/>')
-    add_sand(spec, SAND, disable_floor=True)
-    model = spec.compile()  # what collides with nothing is a visual now, and goes too
-    assert not (model.geom_contype | model.geom_conaffinity)[model.geom_type == int(mujoco.mjtGeom.mjGEOM_PLANE)].any()
-
-
-def test_floors_of_static_bodies_lie_where_they_are():
-    """A floor 3 m down in a body of its own is as far as one of the world."""
-    assert bed_of(BALL + f'<body name="pit" pos="0 0 -3">{FLOOR}</body>').notes == ()
+# Flags ---------------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -214,7 +181,7 @@ def test_a_spec_whose_bed_has_no_name_of_its_own_is_unchanged():
     add_sand(spec, SAND, bodies=["ball"], terrain=9.0)
     before = spec.to_xml()
     with pytest.raises(SceneError, match="another name"):
-        add_sand(spec, SAND, disable_floor=True)
+        add_sand(spec, SAND)
     assert spec.to_xml() == before
 
 
@@ -225,6 +192,6 @@ def test_geoms_that_others_name():
     )
     more = '<sensor><framepos objtype="geom" objname="g"/></sensor><contact><pair geom1="g" geom2="f"/></contact>'
     floor = '<geom name="f" type="plane" size="1 1 .1"/>'
-    model = load(f"<mujoco><worldbody>{floor}{ball}</worldbody>{more}</mujoco>", SAND, disable_floor=True)
+    model = load(f"<mujoco><worldbody>{floor}{ball}</worldbody>{more}</mujoco>", SAND)
     assert model.geom("g").id >= 0
     assert model.geom("f").contype == 0

@@ -10,7 +10,7 @@ from dm_control import composer, mjcf
 from lxml import etree
 
 from rftsim.law.laws import Law
-from rftsim.model.add_sand import add_sand
+from rftsim.model.add_sand import WHOLE, add_sand
 from rftsim.sand.medium import Sand
 
 _SAND_RGB = ((0.78, 0.71, 0.52), (0.72, 0.64, 0.45))
@@ -33,7 +33,6 @@ class SandArena(composer.Arena):
         bodies: "Iterable[str] | str | None" = None,
         geoms: Literal["collision", "all"] = "collision",
         max_edge: float | None = None,
-        allow_open: bool = False,
         force: Literal["implicit", "explicit"] = "implicit",
         name: str = "sand",
     ) -> None:
@@ -47,7 +46,6 @@ class SandArena(composer.Arena):
                 has geoms.
             geoms: Which geoms bound a body: those that can collide, or all.
             max_edge: Longest edge of a triangle [m]; by default a sixth of each geom's size.
-            allow_open: Accept meshes that are not closed, as the rodent's are.
             force: `implicit` or `explicit`, see `rftsim.add_sand`.
             name: Name of the arena.
         """
@@ -59,7 +57,6 @@ class SandArena(composer.Arena):
             "bodies": bodies if bodies is None or isinstance(bodies, str) else tuple(bodies),
             "geoms": geoms,
             "max_edge": max_edge,
-            "allow_open": allow_open,
             "force": force,
         }
         root = _SandyModel(options, self.mjcf_model)
@@ -143,7 +140,7 @@ def put_sand(tree: etree._Element, assets: Mapping[str, bytes], options: Mapping
         RftsimError: The scene cannot have sand.
     """
     spec = _bodies_alone(tree, assets)
-    bed = add_sand(spec, draw=False, **options)
+    bed = add_sand(spec, draw=False, **{**WHOLE, **options})
     plugin = {"plugin": spec.body(next(iter(bed.surfaces))).plugin.plugin_name, "instance": bed.name}
     extension = etree.SubElement(etree.SubElement(tree, "extension"), "plugin", plugin=plugin["plugin"])
     etree.SubElement(extension, "instance", name=bed.name)
