@@ -1,4 +1,4 @@
-"""Tasks on sand: Gymnasium environments, registered on import as `rftsim/NAME-v0`."""
+"""Tasks on sand: Gymnasium environments, registered on import as `rftsim/NAME-v0`; and gymnasium's own, on sand."""
 
 import gymnasium as _gym
 

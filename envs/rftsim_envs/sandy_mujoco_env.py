@@ -71,6 +71,8 @@ def _class(env_id: str) -> Any:
             f"{env_id} is no MuJoCo environment of gymnasium: {getattr(creator, '__name__', creator)} is no "
             "gymnasium.envs.mujoco.MujocoEnv, so it has no floor that could turn to sand"
         )
+    if creator._initialize_simulation is not MujocoEnv._initialize_simulation:
+        raise SceneError(f"{env_id} makes its model in its own way, not from an XML file alone: add_sand to that model")
     return creator
 
 

@@ -12,7 +12,7 @@ import pytest
 pytest.importorskip("imageio")  # which gymnasium's MuJoCo environments need
 
 import rftsim_envs
-from gymnasium.utils.env_checker import data_equivalence
+from gymnasium.utils.env_checker import check_env, data_equivalence
 from gymnasium.vector import AsyncVectorEnv
 
 import rftsim
@@ -118,7 +118,7 @@ def test_contact_forces_are_the_sands():
 
 
 def test_floors_can_stay():
-    env = rftsim_envs.on_sand("Hopper-v5", terrain=-1.0, keep_floor=True, draw=False, reset_noise_scale=0.0)
+    env = rftsim_envs.on_sand("Hopper-v5", terrain=-1.0, keep_floor=True, tolerance=None, reset_noise_scale=0.0)
     random_steps(env, 20)
     assert env.unwrapped.data.ncon > 0
 
@@ -190,6 +190,26 @@ def test_what_cannot_be_is_said_in_a_line():
         rftsim_envs.on_sand("Ant-v5", tolernace=0.01)
     with pytest.raises(rftsim.SandError, match="no sand 'snow'"):
         rftsim_envs.on_sand("Ant-v5", "snow")
+
+
+def test_models_that_are_made_otherwise_are_refused():
+    from gymnasium.envs.mujoco.hopper_v5 import HopperEnv
+
+    class Own(HopperEnv):
+        def _initialize_simulation(self):
+            return super()._initialize_simulation()
+
+    gym.register("OwnHopper-v0", Own)
+    try:
+        with pytest.raises(rftsim.SceneError, match="OwnHopper-v0 makes its model in its own way"):
+            rftsim_envs.on_sand("OwnHopper-v0")
+    finally:
+        del gym.registry["OwnHopper-v0"]
+
+
+@pytest.mark.filterwarnings("ignore:.*Box observation space (min|max)imum value is -?infinity")
+def test_gymnasium_finds_nothing_to_complain_of():
+    check_env(rftsim_envs.on_sand("Hopper-v5").unwrapped, skip_render_check=True)
 
 
 def test_an_explicit_force_leaves_the_integrator():
