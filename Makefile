@@ -4,9 +4,12 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
+# The lowest and the newest MuJoCo that the core is tested on; .venv has the one that dm_control needs.
+MUJOCO_LOWEST := 3.5.0
+MUJOCO_NEWEST := 4.0.0
 export MUJOCO_GL ?= egl
 
-.PHONY: demo test check unit readme native test-slow test-mujoco4 clean
+.PHONY: demo test check unit readme native test-slow test-mujoco clean
 
 demo: $(VENV)/run
 	$(BIN)/rftsim demo
@@ -32,9 +35,11 @@ native: $(VENV)/ready
 test-slow: $(VENV)/ready
 	$(BIN)/pytest -m slow
 
-# The core's own tests on the next MuJoCo, in an environment of its own.
-test-mujoco4: .venv-mujoco4/ready
-	.venv-mujoco4/bin/pytest tests/verification tests/engine
+# The core's own tests on other versions of MuJoCo, each in an environment of its own.
+test-mujoco: test-mujoco-$(MUJOCO_LOWEST) test-mujoco-$(MUJOCO_NEWEST)
+
+test-mujoco-%: .venv-mujoco-%/ready
+	.venv-mujoco-$*/bin/pytest tests/verification tests/engine
 
 # What running needs, and then what checking needs.
 $(VENV)/run: pyproject.toml constraints.txt
@@ -47,14 +52,15 @@ $(VENV)/ready: $(VENV)/run
 	$(PIP) -c constraints.txt -e '.[dev]'
 	touch $@
 
-.venv-mujoco4/ready: pyproject.toml constraints.txt
-	$(PYTHON) -m venv .venv-mujoco4
-	grep -v '^mujoco==' constraints.txt > .venv-mujoco4/constraints.txt
-	.venv-mujoco4/bin/python -m pip install --quiet --disable-pip-version-check -c .venv-mujoco4/constraints.txt \
+.PRECIOUS: .venv-mujoco-%/ready
+.venv-mujoco-%/ready: pyproject.toml constraints.txt
+	$(PYTHON) -m venv .venv-mujoco-$*
+	grep -v '^mujoco==' constraints.txt > .venv-mujoco-$*/constraints.txt
+	.venv-mujoco-$*/bin/python -m pip install --quiet --disable-pip-version-check -c .venv-mujoco-$*/constraints.txt \
 		numpy numba trimesh scipy networkx pytest pytest-benchmark hypothesis rich tyro matplotlib
-	.venv-mujoco4/bin/python -m pip install --quiet --disable-pip-version-check mujoco==4.0.0
-	.venv-mujoco4/bin/python -m pip install --quiet --disable-pip-version-check --no-deps -e .
+	.venv-mujoco-$*/bin/python -m pip install --quiet --disable-pip-version-check mujoco==$*
+	.venv-mujoco-$*/bin/python -m pip install --quiet --disable-pip-version-check --no-deps -e .
 	touch $@
 
 clean:
-	rm -rf .venv .venv-mujoco4 out
+	rm -rf .venv .venv-mujoco-* out

@@ -9,12 +9,17 @@ from typing import Any, Final, Literal, NamedTuple
 
 import mujoco
 import numpy as np
-from mujoco.batch import Batch
 
 from rftsim.bench.subjects import SUBJECTS, in_motion, put
+from rftsim.errors import RftsimError
 from rftsim.law.layout import HEADER, record
 from rftsim.model.readout import instances, work
 from rftsim.surface.triangles import Array
+
+try:
+    from mujoco.batch import Batch
+except ModuleNotFoundError:  # which MuJoCo has since 3.17
+    Batch = None
 
 Ground = Literal["none", "explicit", "implicit"]
 """No sand, or sand with a kind of force."""
@@ -64,7 +69,13 @@ class Timed(NamedTuple):
 
 
 def measure(rounds: int, report: Callable[[str], Any]) -> list[Timed]:
-    """Time every case; `report` is called with what was done, `repetitions(rounds)` times."""
+    """Time every case; `report` is called with what was done, `repetitions(rounds)` times.
+
+    Raises:
+        RftsimError: This MuJoCo has no batches.
+    """
+    if Batch is None:
+        raise RftsimError(f"this needs mujoco.batch, which mujoco>=3.17 has and {mujoco.__version__} has not")
     return [timed for name, law in CASES for timed in _case(name, law, rounds, report)]
 
 

@@ -67,7 +67,7 @@ def footprint_doubts(model: mujoco.MjModel, found: Standing, terrain: FreeSurfac
     small: list[tuple[float, float, Foot]] = []
     for foot in (foot for tree in found.trees for foot in tree.feet):
         felt, seen = (_footprint(model, data, foot.body, collides, terrain) for collides in (True, False))
-        if felt < SMALL * seen:
+        if 0.0 < felt < SMALL * seen:
             small.append((felt, seen, foot))
     if not small:
         return []

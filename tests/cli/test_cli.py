@@ -175,7 +175,7 @@ def test_own_model_with_a_floor(capsys, tmp_path):
     quiet = json.loads(call(capsys, "inspect", path, "--json", "--disable-floor")[1])
     assert quiet["warnings"] == []
     assert quiet["bodies"]["ball"]["triangles"] == quiet["triangles"] > 0
-    code, out, _ = call(capsys, "run", path, "--disable-floor", "--duration", 0.3, "--json")
+    code, out, _ = call(capsys, "run", path, "--duration", 0.3, "--json")
     assert code == 0
     assert json.loads(out)["sinkage_m"] > 0.0
     assert json.loads(out)["slip"] is None
@@ -185,18 +185,18 @@ def test_a_tolerance(capsys, tmp_path):
     """`inspect` says what `run --tolerance` models, with the errors, and which law serves."""
     path = tmp_path / "own.xml"
     path.write_text(FLOOR.replace('size="0.05" density', 'type="ellipsoid" size=".05 .04 .03" density'))
-    told = json.loads(call(capsys, "inspect", path, "--json", "--disable-floor", "--tolerance", 0.1)[1])
+    told = json.loads(call(capsys, "inspect", path, "--json", "--tolerance", 0.1)[1])
     ball = told["bodies"]["ball"]
     assert 0 < ball["needed"] == told["elements"] < ball["triangles"] == told["triangles"]
     assert 0.0 < ball["error"] <= 0.1
     assert 0.0 < ball["error_held_back"] <= 0.2
     assert f"{ball['needed']} elements keep its wrench within" in ball["why"]
     assert [one["law"] for one in told["advice"]] == ["rft3d", "rft3d"]
-    told = json.loads(call(capsys, "inspect", path, "--json", "--disable-floor", "--tolerance", 0.1, "--speed", 2)[1])
+    told = json.loads(call(capsys, "inspect", path, "--json", "--tolerance", 0.1, "--speed", 2)[1])
     assert told["advice"][1]["law"] == "drft3d"
-    assert "--law drft3d, not rft3d" in call(capsys, "inspect", path, "--disable-floor", "--speed", 2)[1]
+    assert "--law drft3d, not rft3d" in call(capsys, "inspect", path, "--speed", 2)[1]
     runs = [
-        json.loads(call(capsys, "run", path, "--disable-floor", "--duration", 0.3, "--json", *more)[1])
+        json.loads(call(capsys, "run", path, "--duration", 0.3, "--json", *more)[1])
         for more in ((), ("--tolerance", 0.1))
     ]
     assert runs[1]["sinkage_m"] == pytest.approx(runs[0]["sinkage_m"], rel=0.1)

@@ -39,6 +39,7 @@ def test_a_shorter_step_is_nearer_to_the_reference(runner, tmp_path):
 
 def test_the_step_with_sand_over_the_one_without(tmp_path):
     """Each evaluation of the force costs time; the batch's simulations have sand of their own and lose no step."""
+    pytest.importorskip("mujoco.batch")
     none, explicit, implicit = environment._case("runner", "drft2d", 3, lambda _: None)
     assert none.ratio == 1.0
     assert 1.0 < explicit.ratio < implicit.ratio

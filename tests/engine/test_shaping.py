@@ -66,7 +66,8 @@ def test_open_meshes_are_their_hulls(meshes):
 
 def test_flat_meshes_are_refused():
     """A mesh without a thickness has no hull; the error names it and the remedy."""
-    asset = '<asset><mesh name="flat" vertex="0 0 0 1 0 0 0 1 0" face="0 1 2" inertia="shell"/></asset>'
+    plate = "0 0 0 1 0 0 0 1 0 1 1 0"
+    asset = f'<asset><mesh name="flat" vertex="{plate}" face="0 1 2 1 3 2" inertia="shell"/></asset>'
     body = '<body name="b"><freejoint/><geom type="mesh" mesh="flat" mass="1" contype="0" conaffinity="0"/></body>'
     with pytest.raises(SurfaceError, match="mesh flat is flat"):
         bed_of(body, asset, geoms="all")
@@ -122,7 +123,8 @@ def test_overlaps_of_a_foot_do_not_count_twice():
     body = '<body name="b"><freejoint/>{}</body>'
     alone, both = (bed_of(body.format(geoms)) for geoms in (foot, foot + shank))
     forces = [
-        surface_force(bed.surfaces["b"], SAND, "rft3d", (0, 0, -0.02), (0, 0, -0.1)).force[2] for bed in (alone, both)
+        surface_force(bed.surfaces["b"], SAND, position=(0, 0, -0.02), velocity=(0, 0, -0.1)).force[2]
+        for bed in (alone, both)
     ]
     assert forces[1] == pytest.approx(forces[0], rel=1e-9)
     assert "united in 1 body" in both.choices[0]

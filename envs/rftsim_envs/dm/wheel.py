@@ -6,7 +6,6 @@ from typing import Any, Final
 
 import mujoco
 import numpy as np
-from dm_control import mujoco as dm_mujoco
 from dm_control.mujoco.wrapper import MjModel
 from dm_control.rl import control
 from dm_control.suite import base
@@ -16,6 +15,7 @@ from rftsim_models.wheels import CARRIAGE, WHEEL, WheelParameters, build_wheel
 from rftsim.model.readout import instances, wrenches
 from rftsim.sand.medium import Sand
 from rftsim.sand.presets import make_sand
+from rftsim_envs.dm.whole_steps import WholeSteps
 from rftsim_envs.ground import lay
 from rftsim_envs.physics import Array
 from rftsim_envs.task import Moment, Task
@@ -33,15 +33,8 @@ STRENGTH: Final = (0.5, 2.0)
 _COLOURS: Final = {"": (0.7, 0.5, 0.3, 1.0), "_default": (0.7, 0.5, 0.3, 1.0), "_highlight": (0.0, 0.5, 0.3, 1.0)}
 
 
-class Physics(dm_mujoco.Physics):
+class Physics(WholeSteps):
     """A wheel on its carriage, on sand, in physical quantities."""
-
-    def step(self, nstep: int = 1) -> None:
-        """Advance by whole steps, as the sand's force is solved for with the step's own controls in hand."""
-        with self.check_invalid_state():
-            mujoco.mj_step(self.model.ptr, self.data.ptr, nstep)
-            if self.legacy_step:  # positions, velocities and the sand's force of where it has come to
-                mujoco.mj_step1(self.model.ptr, self.data.ptr)
 
     def radius(self) -> float:
         """Outer radius of the wheel [m]."""
