@@ -13,7 +13,9 @@ from rftsim import PRESETS, FreeSurface, make_surface, surface_force
 from rftsim.law.laws import get_law
 from rftsim.law.layout import BLOCK, pack_bed
 from rftsim.reduction.facets import merged, settled, split
-from rftsim.reduction.reduce import DEPTHS, HELD_BACK, draw, errors, free_reach, reduced, scaled_wrenches
+from rftsim.reduction.measure import errors, scaled_wrenches
+from rftsim.reduction.reduce import reduced
+from rftsim.reduction.samples import DEPTHS, HELD_BACK, draw, free_reach
 
 BED = pack_bed(PRESETS["poppy-seeds"], get_law("rft3d"), FreeSurface(), (0, 1, 0))
 
