@@ -66,6 +66,13 @@ def settled(labels: Labels, points: Array, weights: Array) -> Labels:
     return labels
 
 
+def spread(labels: Labels, points: Array, weights: Array) -> Array:
+    """How far the points of each cluster lie apart: their weighted second moment about the mean, shape (n,)."""
+    apart = points - _means(labels, points, weights)[labels]
+    found: Array = np.bincount(labels, weights * np.einsum("ij,ij->i", apart, apart))
+    return found
+
+
 def _means(labels: Labels, points: Array, weights: Array) -> Array:
     """Weighted means of the points of each cluster, (n, k)."""
     return _sums(labels, weights[:, None] * points) / np.bincount(labels, weights)[:, None]

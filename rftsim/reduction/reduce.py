@@ -14,21 +14,24 @@ import numpy as np
 
 from rftsim.law import evaluate, layout
 from rftsim.law.layout import BLOCK
-from rftsim.reduction.facets import Labels, features, merged, settled, split
+from rftsim.reduction.facets import Labels, features, merged, settled, split, spread
 from rftsim.reduction.measure import Compared
 from rftsim.reduction.samples import DEPTHS, HELD_BACK, Reach, Samples, draw, free_reach, nearness, some_of
 from rftsim.surface.triangles import Array, Surface
 
-DECIDING, CHECKING, STEERING = 0, 1, 2
+SEEDS: Final = (0, 1, 2)
+DECIDING, CHECKING, STEERING = SEEDS
 """Seeds of the samples that decide, of those held back, and of those that show where facets err."""
-STEERED: Final = 448
+STEERED: Final = 896
 """Samples that show where facets err."""
-WORST: Final = 48
+WORST: Final = 24
 """Those of them, the worst, that decide which facets are split."""
 FEWEST: Final = 8
 """Facets of the first attempt."""
 GROWTH: Final = 1.1, 2.0
 """Facets of the next attempt over those of the last, at least and at most."""
+EVEN: Final = 32
+"""Facets up to which those are split whose triangles lie farthest apart; it is too early to look at errors."""
 CLOSE: Final = 1.06
 """Facets that pass over facets that do not, below which none between are tried."""
 
@@ -46,6 +49,17 @@ class Economy(NamedTuple):
     """Largest error over the poses, depths and motions that it is checked at [-]."""
 
 
+class Partition(NamedTuple):
+    """The triangles of a surface in clusters, and the errors of the facets that these make."""
+
+    labels: Labels
+    """Cluster of each triangle of the surface in blocks, see `Surface.clustered`; shape (ntri,)."""
+    error: float
+    """Largest error over the samples [-]."""
+    held_back: float
+    """Largest error over the poses, depths and motions that it is checked at [-]."""
+
+
 def reduced(
     surface: Surface, bed: Array, tolerance: float, reach: Callable[[int], Reach] = free_reach
 ) -> tuple[Surface, Economy]:
@@ -57,11 +71,22 @@ def reduced(
         tolerance: Largest error [-].
         reach: Gives orientations and motions of the body, by a seed.
     """
+    return put_together(surface, partition(surface, bed, tolerance, reach))
+
+
+def partition(surface: Surface, bed: Array, tolerance: float, reach: Callable[[int], Reach]) -> Partition:
+    """The fewest clusters found whose facets keep the error under a tolerance; arguments as of `reduced`."""
     surface = surface.clustered(BLOCK)
     found = _Search(surface, bed, tolerance, reach).fewest() if surface.ntri > BLOCK else None
     if found is None:
-        return surface, Economy(surface.ntri, surface.ntri, 0.0, 0.0)
-    facets = dataclasses.replace(found.facets, outline=surface.corners)
+        return Partition(np.arange(surface.ntri), 0.0, 0.0)
+    return Partition(found.labels, found.error, found.held_back)
+
+
+def put_together(surface: Surface, found: Partition) -> tuple[Surface, Economy]:
+    """The surface of a facet for each cluster, in blocks, and its numbers; itself where each is of one triangle."""
+    surface = surface.clustered(BLOCK)
+    facets = merged(surface, found.labels) if found.labels.max() + 1 < surface.ntri else surface
     return facets.clustered(BLOCK), Economy(surface.ntri, facets.ntri, found.error, found.held_back)
 
 
@@ -93,6 +118,7 @@ class _Search:
         corners = surface.corners
         self.surface = dataclasses.replace(surface, outline=np.array([corners.min(axis=0), corners.max(axis=0)]))
         self.packed = layout.pack_surface(surface)
+        self.forces: dict[int, Array] = {}
         self.deciding = Compared(self.surface, bed, self.drawn(DECIDING, DEPTHS))
         self.steering = Compared(self.surface, bed, some_of(self.drawn(STEERING, DEPTHS), STEERED))
         self.points = features(surface, nearness(self.deciding.samples, layout.record(bed, layout.BED).up))
@@ -141,8 +167,9 @@ class _Search:
         while (lacking := count - facets.ntri) > 0:
             if count >= self.surface.ntri:
                 return None
-            chosen = np.argsort(-self._shares(labels, facets), kind="stable")[:lacking]
-            labels = split(labels, chosen, self.points, self.surface.areas)
+            places = self.points, self.surface.areas
+            shares = spread(labels, *places) if facets.ntri < EVEN else self._shares(labels, facets)
+            labels = split(labels, np.argsort(-shares, kind="stable")[:lacking], *places)
             if labels.max() + 1 == facets.ntri:
                 return None
             facets = merged(self.surface, labels)
@@ -152,15 +179,17 @@ class _Search:
         """Each facet's part in the error of the wrench, (nfacet,): squares of the errors of its own force, summed."""
         self.steering.worst(facets, math.inf)
         packed, share = layout.pack_surface(facets), np.zeros(facets.ntri)
-        for sample in self.steering.order[:WORST]:
-            fine, coarse = (
-                self._forces(body, areas, sample)
-                for body, areas in ((self.packed, self.surface.areas), (packed, facets.areas))
-            )
-            force = [np.bincount(labels, column) for column in fine.T]
-            share += ((force - coarse.T) ** 2).sum(axis=0) / self.steering.scale[sample] ** 2
+        for sample in self.steering.order[:WORST].tolist():
+            coarse = self._stresses(packed, sample).T * facets.areas
+            for fine, own in zip(self._forces(sample), coarse, strict=True):
+                share += ((np.bincount(labels, fine) - own) / self.steering.scale[sample]) ** 2
         return share
 
-    def _forces(self, packed: Array, areas: Array, sample: int) -> Array:
-        at = [x[sample] for x in self.steering.samples[1:]]
-        return evaluate.triangle_stresses(self.bed, packed, *at)[0] * areas[:, None]
+    def _forces(self, sample: int) -> Array:
+        """Force on each triangle of the whole surface at a steering sample [N], body frame, (3, ntri)."""
+        if sample not in self.forces:
+            self.forces[sample] = np.ascontiguousarray(self._stresses(self.packed, sample).T * self.surface.areas)
+        return self.forces[sample]
+
+    def _stresses(self, packed: Array, sample: int) -> Array:
+        return evaluate.triangle_stresses(self.bed, packed, *(x[sample] for x in self.steering.samples[1:]))[0]
