@@ -69,8 +69,7 @@ def settled(labels: Labels, points: Array, weights: Array) -> Labels:
 def spread(labels: Labels, points: Array, weights: Array) -> Array:
     """How far the points of each cluster lie apart: their weighted second moment about the mean, shape (n,)."""
     apart = points - _means(labels, points, weights)[labels]
-    found: Array = np.bincount(labels, weights * np.einsum("ij,ij->i", apart, apart))
-    return found
+    return _sums(labels, (weights * np.einsum("ij,ij->i", apart, apart))[:, None])[:, 0]
 
 
 def _means(labels: Labels, points: Array, weights: Array) -> Array:
@@ -89,7 +88,8 @@ def _moments(labels: Labels, apart: Array, weights: Array) -> Array:
 
 def _sums(labels: Labels, values: Array) -> Array:
     """Sums over each cluster, (n, k), of values of shape (npoint, k)."""
-    return np.column_stack([np.bincount(labels, column) for column in values.T])
+    found: Array = np.column_stack([np.bincount(labels, column) for column in values.T])
+    return found
 
 
 def _nearest(points: Array, means: Array) -> Labels:
