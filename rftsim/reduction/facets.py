@@ -30,7 +30,8 @@ def features(surface: Surface, nearness: Array) -> Array:
         surface: The triangles.
         nearness: Symmetric matrix, shape (3, 3); to the sand two centroids lie |nearness (c1 - c2)| apart.
     """
-    return np.hstack([surface.centres @ nearness / surface.size, TURN * surface.normals])
+    apart = surface.centres - surface.centres.mean(axis=0)
+    return np.hstack([apart @ nearness / surface.size, TURN * surface.normals])
 
 
 def split(labels: Labels, chosen: Labels, points: Array, weights: Array) -> Labels:

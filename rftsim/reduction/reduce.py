@@ -140,10 +140,8 @@ class _Search:
                 passed = tried
             else:
                 failed = tried
-                slowest, fastest = GROWTH
-                count = math.ceil(
-                    tried.facets.ntri * min(max(math.sqrt(tried.error / self.tolerance), slowest), fastest)
-                )
+                factor = min(max(math.sqrt(tried.error / self.tolerance), GROWTH[0]), GROWTH[1])
+                count = max(math.ceil(factor * tried.facets.ntri), count + 1)  # some clusters may be lost in settling
         while passed.facets.ntri > CLOSE * failed.facets.ntri:
             tried = self._grown(failed, int(math.sqrt(passed.facets.ntri * failed.facets.ntri)))
             if tried is None or not failed.facets.ntri < tried.facets.ntri < passed.facets.ntri:
