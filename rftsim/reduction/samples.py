@@ -16,7 +16,7 @@ DEPTHS: Final = (0.02, 0.05, 0.1, 0.25, 0.5, 1.0, 2.0)
 """Depths of the lowest corner that are sampled, over the body's size."""
 HELD_BACK: Final = (0.03, 0.07, 0.1, 0.15, 0.35, 0.7, 1.5)
 """Those at which what passed is checked, with other poses and motions."""
-POSES: Final = 32
+POSES: Final = 40
 """Orientations of a body."""
 MOTIONS: Final = 4
 """Motions at each orientation and depth."""
