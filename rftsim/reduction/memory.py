@@ -1,4 +1,4 @@
-"""Reductions remembered: for bodies alike within a load, and in the user's cache folder from one load to the next.
+"""Reductions remembered: for bodies alike within a load, and in the user's cache folder for the next ones.
 
 A file holds the cluster of each triangle and the errors found, nothing that could be run. Its name is a hash of all
 that these depend on: triangles, sand, tolerance, reach, and the code that searches. What cannot be read, is of another
@@ -21,9 +21,11 @@ import numpy as np
 
 from rftsim.errors import RftsimError
 from rftsim.files import replacing
+from rftsim.law.layout import BLOCK
 from rftsim.machine.sources import PACKAGE, SOURCE
 from rftsim.reduction.reduce import SEEDS, Economy, Partition, partition, put_together
 from rftsim.reduction.samples import Reach, free_reach
+from rftsim.reduction.twins import counterparts
 from rftsim.surface.triangles import Array, Surface
 
 MOST: Final = 1000
@@ -43,15 +45,32 @@ class Memory:
     def __init__(self, folder: Path | None) -> None:
         self.folder = folder
         self.known: dict[str, Partition] = {}
+        self.free: list[tuple[Surface, bytes, Partition]] = []
+        """Surfaces of free bodies in blocks, sand and tolerance, and what was found."""
 
     def reduced(
         self, surface: Surface, bed: Array, tolerance: float, reach: Callable[[int], Reach] = free_reach
     ) -> tuple[Surface, Economy]:
         """The surface in the fewest facets found, from memory where it is known; arguments as of `reduce.reduced`."""
-        name = _name(surface, bed, tolerance, [reach(seed) for seed in SEEDS])
+        reaches = [reach(seed) for seed in SEEDS]
+        name = _name(surface, bed, tolerance, reaches)
         if name not in self.known:
-            self.known[name] = self._kept(name, surface, functools.partial(partition, surface, bed, tolerance, reach))
+            search = functools.partial(partition, surface, bed, tolerance, reach)
+            if _is_free(reaches) and surface.wheel is None:
+                search = functools.partial(self._searched, surface, bed, tolerance)
+            self.known[name] = self._kept(name, surface, search)
         return put_together(surface, self.known[name])
+
+    def _searched(self, surface: Surface, bed: Array, tolerance: float) -> Partition:
+        """The reduction of a free body, by a search or from that of its image."""
+        blocks, conditions = surface.clustered(BLOCK), bed.tobytes() + repr(tolerance).encode()
+        for other, under, found in self.free:
+            image = counterparts(blocks, other) if under == conditions else None
+            if image is not None:
+                return found._replace(labels=found.labels[image])
+        found = partition(surface, bed, tolerance, free_reach)
+        self.free.append((blocks, conditions, found))
+        return found
 
     def _kept(self, name: str, surface: Surface, search: Callable[[], Partition]) -> Partition:
         """The reduction of that name from the folder, or by a search now, which is then kept there."""
@@ -71,6 +90,12 @@ def user_folder() -> Path | None:
     usual = {"darwin": "~/Library/Caches", "win32": "~/AppData/Local"}.get(sys.platform, "~/.cache")
     users = chosen if os.path.isabs(chosen) else os.path.expanduser(usual)
     return Path(users) / "rftsim" / "reduced" if os.path.isabs(users) else None
+
+
+def _is_free(reaches: list[Reach]) -> bool:
+    """Whether the reaches at SEEDS are those of a body that is free."""
+    pairs = zip(reaches, map(free_reach, SEEDS), strict=True)
+    return all(np.array_equal(one, other) for pair in pairs for one, other in zip(*pair, strict=True))
 
 
 @functools.cache

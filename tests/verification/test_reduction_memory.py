@@ -1,5 +1,6 @@
 """Reductions remembered: from one load to the next, for bodies alike, and never against a file's will to mislead."""
 
+import dataclasses
 import os
 
 import numpy as np
@@ -10,8 +11,10 @@ from rftsim import PRESETS, FreeSurface
 from rftsim.law.laws import get_law
 from rftsim.law.layout import pack_bed
 from rftsim.reduction import memory, reduce
+from rftsim.reduction.measure import errors, scaled_wrenches
 from rftsim.reduction.memory import Memory, user_folder
-from rftsim.reduction.samples import Reach, free_reach
+from rftsim.reduction.samples import DEPTHS, Reach, Samples, draw, free_reach
+from rftsim.surface.triangles import Wheel
 
 BED = pack_bed(PRESETS["poppy-seeds"], get_law("rft3d"), FreeSurface(), (0, 1, 0))
 SURFACE = blob(np.random.default_rng(0), subdivisions=3)
@@ -69,6 +72,41 @@ def test_another_problem_is_searched_anew(what, tmp_path, searches, monkeypatch)
         monkeypatch.setattr(memory, "_code", lambda: b"of tomorrow")
     Memory(tmp_path).reduced(surface, bed, tolerance, reach)
     assert len(searches) == 2
+
+
+@pytest.mark.parametrize("law", ["rft3d", "rft2d", "drft3d"])
+def test_a_mirror_image_is_not_searched(law, searches):
+    """Its facets are the images of the other's, and err as much where the other's images are."""
+    bed = pack_bed(PRESETS["poppy-seeds"], get_law(law), FreeSurface(), (0, 1, 0))
+    mirror, shift, order = np.diag([1.0, -1.0, 1.0]), (0.01, 0.0, -0.02), np.random.default_rng(1)
+    turned = (SURFACE.triangles @ mirror)[:, ::-1].astype(np.float32) + shift
+    image = dataclasses.replace(SURFACE, triangles=order.permutation(turned))
+    remembered = Memory(None)
+    (facets, found), (other, same) = (remembered.reduced(one, bed, TOLERANCE) for one in (SURFACE, image))
+    assert len(searches) == 1
+    assert same == found
+    samples = draw(SURFACE, bed, free_reach(0), DEPTHS, 0)
+    turns = mirror @ samples.rotation @ mirror  # across the plane of motion
+    velocity, omega, moved = samples.velocity @ mirror, -samples.omega @ mirror, turns @ shift
+    position = samples.position @ mirror - moved
+    reflected = Samples(samples.depth, position, turns, velocity - np.cross(omega, moved), omega)
+    pair = [scaled_wrenches(one, bed, samples) for one in (SURFACE, facets)]
+    images = [scaled_wrenches(one, bed, reflected) for one in (image, other)]
+    error = errors(*pair, samples.depth).max()
+    assert error == pytest.approx(found.error)
+    assert errors(*images, samples.depth).max() == pytest.approx(error, rel=0.05)
+
+
+def test_no_mirror_images_where_a_body_is_not_free(searches):
+    """Left and right need not reach the same; nor is a wheel that turns the other way the same."""
+    image = dataclasses.replace(SURFACE, triangles=(SURFACE.triangles * [1, -1, 1])[:, ::-1])
+    remembered = Memory(None)
+    for surface in (SURFACE, image):
+        remembered.reduced(surface, BED, TOLERANCE, level)
+    wheel = Wheel((0, 1, 0), (0, 0, 0), SURFACE.size / 2)
+    for surface in (SURFACE, image):
+        remembered.reduced(dataclasses.replace(surface, wheel=wheel), BED, TOLERANCE)
+    assert len(searches) == 4
 
 
 def truncated(path):
