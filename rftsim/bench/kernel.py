@@ -16,7 +16,7 @@ import numpy as np
 from rftsim.law.laws import get_law
 from rftsim.law.layout import BLOCK, COLUMNS, pack_bed, pack_surface
 from rftsim.law.leading import leads
-from rftsim.reduction.reduce import middle
+from rftsim.reduction.samples import middle
 from rftsim.sand.free_surface import FreeSurface
 from rftsim.sand.medium import Sand
 from rftsim.surface import solids

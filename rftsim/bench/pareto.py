@@ -21,7 +21,7 @@ from rftsim.bench.subjects import SUBJECTS, Subject
 from rftsim.bench.trials import Force
 from rftsim.model.reach import sampled_reach
 from rftsim.model.readout import instances
-from rftsim.reduction import reduce
+from rftsim.reduction import facets, measure, reduce, samples
 from rftsim.run.scenes import Staged
 from rftsim.surface.triangles import Array
 
@@ -54,7 +54,7 @@ class Tried(NamedTuple):
     elements: int
     """Triangles or facets, of all bodies."""
     wrench_error: float
-    """Largest error of a body's wrench over poses and motions, see `reduce.errors`."""
+    """Largest error of a body's wrench over poses and motions, see `measure.errors`."""
     force: Force
     """The sand's force."""
     h: float
@@ -88,7 +88,7 @@ class Study:
     """
 
     def __init__(self, path: Path, quick: bool) -> None:
-        self.kept = remember(path, subjects, reduce, sys.modules[__name__])
+        self.kept = remember(path, subjects, facets, measure, reduce, samples, sys.modules[__name__])
         self.quick = quick
 
     def laws(self, name: str) -> tuple[str, ...]:
@@ -198,7 +198,7 @@ def _wrench_error(fine: Staged, staged: Staged) -> float:
     found = []
     for name, surface in fine.bed.surfaces.items():
         reach = sampled_reach(fine.model, fine.model.body(name).id, surface, SEED)
-        samples = reduce.draw(surface, bed.packed, reach, reduce.DEPTHS, SEED)
-        whole, reduced = (reduce.scaled_wrenches(s, bed.packed, samples) for s in (surface, staged.bed.surfaces[name]))
-        found.append(reduce.errors(whole, reduced, samples.depth).max())
+        drawn = samples.draw(surface, bed.packed, reach, samples.DEPTHS, SEED)
+        whole, reduced = (measure.scaled_wrenches(s, bed.packed, drawn) for s in (surface, staged.bed.surfaces[name]))
+        found.append(measure.errors(whole, reduced, drawn.depth).max())
     return float(max(found))

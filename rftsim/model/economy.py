@@ -7,7 +7,7 @@ import mujoco
 from rftsim.law import layout
 from rftsim.model.felt import Felt
 from rftsim.model.reach import sampled_reach
-from rftsim.reduction import reduce
+from rftsim.reduction.memory import Memory, user_folder
 from rftsim.reduction.reduce import Economy
 from rftsim.surface.triangles import Array
 
@@ -24,10 +24,10 @@ def economise(model: mujoco.MjModel, felt: Felt, bed: Array, tolerance: float) -
     Returns:
         The numbers of each surface before and after, by body name.
     """
-    economies = {}
+    economies, memory = {}, Memory(user_folder())
     for name, surface in felt.surfaces.items():
-        reach = functools.partial(sampled_reach, model, model.body(name).id, surface)
-        felt.surfaces[name], economies[name] = reduce.reduced(surface, bed, tolerance, reach)
+        reach = functools.cache(functools.partial(sampled_reach, model, model.body(name).id, surface))
+        felt.surfaces[name], economies[name] = memory.reduced(surface, bed, tolerance, reach)
         felt.reasons[name] += f"; {_said(economies[name], tolerance)}"
     return economies
 

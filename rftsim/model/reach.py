@@ -6,7 +6,7 @@ from typing import Final
 import mujoco
 import numpy as np
 
-from rftsim.reduction.reduce import POSES, Reach, middle
+from rftsim.reduction.samples import POSES, Reach, free_reach, middle
 from rftsim.sand.free_surface import FreeSurface
 from rftsim.surface.triangles import Array, Surface
 
@@ -24,40 +24,59 @@ def sampled_reach(model: mujoco.MjModel, body: int, surface: Surface, seed: int)
         surface: Its surface.
         seed: Seed of the joint positions.
     """
+    if _hangs_on_nothing(model, body):
+        return free_reach(seed)
     rng = np.random.default_rng(seed)
     data = mujoco.MjData(model)
-    turn, motions = np.empty((POSES, 3, 3)), np.empty((POSES, 6, 6))
-    jacobian, scale = np.empty((2, 3, model.nv)), np.repeat([1.0, surface.size / 2], 3)
+    turn, jacobians = np.empty((POSES, 3, 3)), np.empty((POSES, 2, 3, model.nv))
+    positions = _scattered(model, rng)
     for i in range(POSES):
-        _scatter(model, data.qpos, rng)
+        data.qpos[:] = positions[i]
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
         turn[i] = data.xmat[body].reshape(3, 3)
-        mujoco.mj_jac(model, data, jacobian[0], jacobian[1], data.xpos[body] + turn[i] @ middle(surface), body)
-        basis, share, _ = np.linalg.svd(scale[:, None] * jacobian.reshape(6, -1), full_matrices=False)
-        basis = basis[:, share > 1e-9 * share[0]]
-        motions[i] = basis @ basis.T
-    return Reach(turn, motions)
+        point = data.xpos[body] + turn[i] @ middle(surface)
+        mujoco.mj_jac(model, data, jacobians[i, 0], jacobians[i, 1], point, body)
+    scaled = jacobians.reshape(POSES, 6, -1) * np.repeat([1.0, surface.size / 2], 3)[:, None]
+    basis, share, _ = np.linalg.svd(scaled, full_matrices=False)
+    basis = basis * (share > 1e-9 * share[:, :1])[:, None]
+    return Reach(turn, basis @ basis.transpose(0, 2, 1))
 
 
-def _scatter(model: mujoco.MjModel, qpos: Array, rng: np.random.Generator) -> None:
-    """Draw joint positions within their ranges; where a body stands does not matter, so free ones stay."""
+def _hangs_on_nothing(model: mujoco.MjModel, body: int) -> bool:
+    """Whether a body's tree has a free joint: then every orientation is as likely, and every motion allowed."""
+    root = model.body_rootid[body]
+    return bool(model.body_jntnum[root]) and model.jnt_type[model.body_jntadr[root]] == int(_JOINT.mjJNT_FREE)
+
+
+def _scattered(model: mujoco.MjModel, rng: np.random.Generator) -> Array:
+    """Joint positions drawn within their ranges, (POSES, nq); where a body stands does not matter, so free ones stay.
+
+    That turns them any way within their range, if they have one.
+    """
+    positions = np.tile(model.qpos0, (POSES, 1))
     for joint in range(model.njnt):
         kind, at = _JOINT(model.jnt_type[joint]), model.jnt_qposadr[joint]
         limited, (low, high) = bool(model.jnt_limited[joint]), model.jnt_range[joint]
-        if kind in (_JOINT.mjJNT_FREE, _JOINT.mjJNT_BALL):
-            at += 3 if kind == _JOINT.mjJNT_FREE else 0
-            from scipy.spatial.transform import Rotation  # not at start-up, see `facets`
-
-            turned = Rotation.random(random_state=rng)
-            if limited:
-                axis = turned.apply([0.0, 0.0, 1.0])
-                turned = Rotation.from_rotvec(rng.uniform(0.0, high) * axis)
-            qpos[at : at + 4] = np.roll(turned.as_quat(), 1)
+        if kind == _JOINT.mjJNT_BALL:
+            positions[:, at : at + 4] = _quaternions(high if limited else None, rng)
+        elif kind == _JOINT.mjJNT_FREE:
+            positions[:, at + 3 : at + 7] = _quaternions(None, rng)
         elif limited:
-            qpos[at] = rng.uniform(low, high)
+            positions[:, at] = rng.uniform(low, high, size=POSES)
         elif kind == _JOINT.mjJNT_HINGE:
-            qpos[at] = rng.uniform(-math.pi, math.pi)
+            positions[:, at] = rng.uniform(-math.pi, math.pi, size=POSES)
+    return positions
+
+
+def _quaternions(largest: float | None, rng: np.random.Generator) -> Array:
+    """Unit quaternions, (POSES, 4): of any turn, or of turns by up to the largest angle [rad] about any axis."""
+    drawn = rng.normal(size=(POSES, 4))
+    if largest is None:
+        return drawn / np.linalg.norm(drawn, axis=1, keepdims=True)  # type: ignore[no-any-return]
+    half = rng.uniform(0.0, largest / 2, size=(POSES, 1))
+    axis = drawn[:, 1:] / np.linalg.norm(drawn[:, 1:], axis=1, keepdims=True)
+    return np.hstack([np.cos(half), np.sin(half) * axis])
 
 
 def stays_in_plane(model: mujoco.MjModel, body: int, plane: Array) -> bool:

@@ -19,6 +19,8 @@ TURN: Final = 0.25
 """How far two normals' difference counts against two centroids', which count in body sizes; found by trial."""
 ROUNDS: Final = 2
 """Rounds in which triangles change to the nearest cluster."""
+CHUNK: Final = 512
+"""Points that are held against all means at once; so many keep the distances in the processor's cache."""
 
 
 def features(surface: Surface, nearness: Array) -> Array:
@@ -28,7 +30,8 @@ def features(surface: Surface, nearness: Array) -> Array:
         surface: The triangles.
         nearness: Symmetric matrix, shape (3, 3); to the sand two centroids lie |nearness (c1 - c2)| apart.
     """
-    return np.hstack([surface.centres @ nearness / surface.size, TURN * surface.normals])
+    apart = surface.centres - surface.centres.mean(axis=0)
+    return np.hstack([apart @ nearness / surface.size, TURN * surface.normals])
 
 
 def split(labels: Labels, chosen: Labels, points: Array, weights: Array) -> Labels:
@@ -40,30 +43,65 @@ def split(labels: Labels, chosen: Labels, points: Array, weights: Array) -> Labe
         points: Places of the points, shape (npoint, k).
         weights: Weight of each point, shape (npoint,).
     """
+    count = int(labels.max()) + 1
+    place = np.full(count, -1)
+    place[chosen] = np.arange(len(chosen))
+    among = np.flatnonzero(place[labels] >= 0)
+    own, weight = place[labels[among]], weights[among]
+    apart = points[among] - _means(own, points[among], weight)[own]
+    axis = np.linalg.eigh(_moments(own, apart, weight))[1][:, :, -1]
+    ahead = np.einsum("ij,ij->i", apart, axis[own]) > 1e-12
+    part = np.bincount(own[ahead], minlength=len(chosen))
+    can = (part > 0) & (part < np.bincount(own, minlength=len(chosen)))
+    fresh = count + np.cumsum(can) - 1
+    moved = ahead & can[own]
     labels = labels.copy()
-    order = np.argsort(labels, kind="stable")
-    ends = np.cumsum(np.bincount(labels))
-    fresh = len(ends)
-    for cluster in chosen:
-        part = order[ends[cluster - 1] if cluster else 0 : ends[cluster]]
-        apart = points[part] - np.average(points[part], axis=0, weights=weights[part])
-        axis = np.linalg.eigh((weights[part, None] * apart).T @ apart)[1][:, -1]
-        ahead = apart @ axis > 1e-12
-        if ahead.any() and not ahead.all():
-            labels[part[ahead]] = fresh
-            fresh += 1
+    labels[among[moved]] = fresh[own[moved]]
     return labels
 
 
 def settled(labels: Labels, points: Array, weights: Array) -> Labels:
     """The labels after each point went to the cluster of the nearest mean, ROUNDS times; arguments as of `split`."""
-    from scipy.spatial import cKDTree  # not at start-up, which it would slow by half a second
-
     for _ in range(ROUNDS):
-        weight = np.bincount(labels, weights)
-        means = np.column_stack([np.bincount(labels, weights * column) for column in points.T]) / weight[:, None]
-        labels = np.unique(cKDTree(means).query(points)[1], return_inverse=True)[1]
+        labels = np.unique(_nearest(points, _means(labels, points, weights)), return_inverse=True)[1]
     return labels
+
+
+def spread(labels: Labels, points: Array, weights: Array) -> Array:
+    """How far the points of each cluster lie apart: their weighted second moment about the mean, shape (n,)."""
+    apart = points - _means(labels, points, weights)[labels]
+    return _sums(labels, (weights * np.einsum("ij,ij->i", apart, apart))[:, None])[:, 0]
+
+
+def _means(labels: Labels, points: Array, weights: Array) -> Array:
+    """Weighted means of the points of each cluster, (n, k)."""
+    return _sums(labels, weights[:, None] * points) / np.bincount(labels, weights)[:, None]
+
+
+def _moments(labels: Labels, apart: Array, weights: Array) -> Array:
+    """Second moments of each cluster's points about its mean, (n, k, k)."""
+    k = apart.shape[1]
+    i, j = np.triu_indices(k)
+    found = np.empty((int(labels.max()) + 1, k, k))
+    found[:, i, j] = found[:, j, i] = _sums(labels, weights[:, None] * apart[:, i] * apart[:, j])
+    return found
+
+
+def _sums(labels: Labels, values: Array) -> Array:
+    """Sums over each cluster, (n, k), of values of shape (npoint, k)."""
+    found: Array = np.column_stack([np.bincount(labels, column) for column in values.T])
+    return found
+
+
+def _nearest(points: Array, means: Array) -> Labels:
+    """The nearest mean to each point, (npoint,); in single precision, which is twice as fast."""
+    place, means = points.astype(np.float32), means.astype(np.float32)
+    across, square = -2.0 * means.T, (means**2).sum(axis=1)
+    found = np.empty(len(points), dtype=np.intp)
+    for start in range(0, len(points), CHUNK):
+        part = slice(start, start + CHUNK)
+        found[part] = np.argmin(place[part] @ across + square, axis=1)
+    return found
 
 
 def merged(surface: Surface, labels: Labels) -> Surface:
@@ -74,10 +112,7 @@ def merged(surface: Surface, labels: Labels) -> Surface:
     """
     vectors, areas, centres = surface.normals * surface.areas[:, None], surface.areas, surface.centres
 
-    def summed(values: Array) -> Array:
-        return np.column_stack([np.bincount(labels, column) for column in values.T])
-
-    vector, middle = summed(vectors), summed(areas[:, None] * centres) / np.bincount(labels, areas)[:, None]
+    vector, middle = _sums(labels, vectors), _means(labels, centres, areas)
     area = np.maximum(np.linalg.norm(vector, axis=1), 1e-15 * areas.sum())
     normal = np.where(area[:, None] > 1e-14 * areas.sum(), vector / area[:, None], [0.0, 0.0, 1.0])
     volume = np.bincount(labels, np.einsum("ij,ij->i", centres, vectors))  # three times that of the cone to the origin

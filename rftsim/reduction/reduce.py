@@ -1,69 +1,39 @@
 """The fewest facets whose wrench is that of all triangles within a tolerance, over sampled poses and motions.
 
-The error at a pose and motion is
-
-    max(|dF|, |dM| / (L/2)) / max(|F|, |M| / (L/2)),
-
-M about the centre of the body's box, L the body's size, and the denominator the largest over all samples of that depth;
-for depths under a tenth of L, of a tenth: a body that just touches is not asked for a share of nothing. What passes is
-held against other poses, depths and motions, too, where twice the tolerance is let pass.
+The error is that of `measure`. What passes is held against other poses, depths and motions, too, where twice the
+tolerance is let pass.
 """
 
+import dataclasses
+import functools
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Final, NamedTuple
 
 import numpy as np
 
 from rftsim.law import evaluate, layout
 from rftsim.law.layout import BLOCK
-from rftsim.reduction.facets import Labels, features, merged, settled, split
+from rftsim.reduction.facets import Labels, features, merged, settled, split, spread
+from rftsim.reduction.measure import Compared
+from rftsim.reduction.samples import DEPTHS, HELD_BACK, Reach, Samples, draw, free_reach, nearness, some_of
 from rftsim.surface.triangles import Array, Surface
 
-DEPTHS: Final = (0.02, 0.05, 0.1, 0.25, 0.5, 1.0, 2.0)
-"""Depths of the lowest corner that are sampled, over the body's size."""
-HELD_BACK: Final = (0.03, 0.07, 0.1, 0.15, 0.35, 0.7, 1.5)
-"""Those at which what passed is checked, with other poses and motions."""
-SHALLOW: Final = 0.1
-"""Depth, over the body's size, that lends its scale to lesser ones."""
-POSES: Final = 16
-"""Orientations of a body."""
-MOTIONS: Final = 18
-"""Motions at each orientation and depth."""
-
-GROWTH: Final = 1.2
-"""Facets of the next attempt over those of the last."""
-STEERING: Final = 400
-"""Samples that are drawn anew for each attempt, to see where facets err."""
-WORST: Final = 64
+SEEDS: Final = (0, 1, 2)
+DECIDING, CHECKING, STEERING = SEEDS
+"""Seeds of the samples that decide, of those held back, and of those that show where facets err."""
+STEERED: Final = 896
+"""Samples that show where facets err."""
+WORST: Final = 24
 """Those of them, the worst, that decide which facets are split."""
-ASIDE: Final = 0.05
-"""How far motions lie from the axes: exactly along them the law of a body with symmetries may jump."""
-
-
-class Reach(NamedTuple):
-    """The orientations that a body can take, and the motions that it can make there."""
-
-    rotations: Array
-    """Rotations from the body to the world frame, shape (n, 3, 3)."""
-    motions: Array
-    """Projections of a motion onto those that the joints allow, shape (n, 6, 6): velocity of the body's centre, then
-    angular velocity times half the body's size; world frame."""
-
-
-class Samples(NamedTuple):
-    """The poses and motions at which a body's wrench is compared, n of them."""
-
-    depth: Array
-    """Depth of the lowest corner over the body's size [-], shape (n,)."""
-    position: Array
-    """Position of the body's origin [m], shape (n, 3)."""
-    rotation: Array
-    """Rotation from the body to the world frame, shape (n, 3, 3)."""
-    velocity: Array
-    """Velocity of the body's origin [m/s], shape (n, 3)."""
-    omega: Array
-    """Angular velocity, world frame [rad/s], shape (n, 3)."""
+FEWEST: Final = 8
+"""Facets of the first attempt."""
+GROWTH: Final = 1.1, 2.0
+"""Facets of the next attempt over those of the last, at least and at most."""
+EVEN: Final = 32
+"""Facets up to which those are split whose triangles lie farthest apart; it is too early to look at errors."""
+CLOSE: Final = 1.06
+"""Facets that pass over facets that do not, below which none between are tried."""
 
 
 class Economy(NamedTuple):
@@ -79,81 +49,15 @@ class Economy(NamedTuple):
     """Largest error over the poses, depths and motions that it is checked at [-]."""
 
 
-def free_reach(seed: int) -> Reach:
-    """The reach of a body that is free: any orientation, drawn by a seed, and any motion."""
-    from scipy.spatial.transform import Rotation  # not at start-up, see `facets`
+class Partition(NamedTuple):
+    """The triangles of a surface in clusters, and the errors of the facets that these make."""
 
-    rotations = Rotation.random(POSES, random_state=np.random.default_rng(seed)).as_matrix()
-    return Reach(rotations, np.broadcast_to(np.eye(6), (POSES, 6, 6)))
-
-
-def middle(surface: Surface) -> Array:
-    """Centre of the box around a surface, body frame [m], shape (3,)."""
-    low, high = surface.corners.min(axis=0), surface.corners.max(axis=0)
-    return 0.5 * (low + high)  # type: ignore[no-any-return]
-
-
-def draw(surface: Surface, bed: Array, reach: Reach, depths: tuple[float, ...], seed: int) -> Samples:
-    """Samples of each orientation of a body at each depth, with MOTIONS motions each.
-
-    Near the translations along the three axes and the rotations about them, both ways, and others drawn at random, as
-    far as the joints allow; at speeds of 0.1 to 1 sqrt(g L), which only the dynamic laws notice.
-
-    Args:
-        surface: The body's surface.
-        bed: Packed sand.
-        reach: Orientations and motions of the body.
-        depths: Depths of the lowest corner, over the body's size [-].
-        seed: Seed of the motions.
-    """
-    rng = np.random.default_rng(seed)
-    sand = layout.record(bed, layout.BED)
-    size, centre, up, g = surface.size, middle(surface), sand.up, sand.g
-    rows: list[tuple[float, Array, Array, Array, Array]] = []
-    for rotation, allowed in zip(reach.rotations, reach.motions, strict=True):
-        lowest = float((surface.corners @ rotation.T @ up).min())
-        for depth in depths:
-            position = (sand.offset - lowest - depth * size) * up
-            for motion in _motions(allowed, math.sqrt(g * size), rng):
-                omega = motion[3:] / (size / 2)
-                rows.append((depth, position, rotation, motion[:3] - np.cross(omega, rotation @ centre), omega))
-    return Samples(*(np.array(column) for column in zip(*rows, strict=True)))
-
-
-def _motions(allowed: Array, fastest: float, rng: np.random.Generator) -> Iterator[Array]:
-    """Allowed motions of a tenth of the fastest speed to all of it, (6,) each, those near the axes first."""
-    axes = np.vstack([np.eye(6), -np.eye(6)]) + rng.normal(scale=ASIDE, size=(12, 6))
-    wanted = np.vstack([axes, rng.normal(size=(MOTIONS - 12, 6))])
-    for motion in wanted / np.linalg.norm(wanted, axis=1, keepdims=True) @ allowed.T:
-        length = np.linalg.norm(motion)
-        if length >= 0.1:  # less is what is left of a motion that the joints forbid
-            yield motion / length * fastest * rng.uniform(0.1, 1.0)
-
-
-def scaled_wrenches(surface: Surface, bed: Array, samples: Samples) -> Array:
-    """Force, and moment about the body's centre over half its size, at each sample [N], shape (n, 6)."""
-    body = layout.pack_surface(surface)
-    found = evaluate.body_wrenches(bed, body, *samples[1:])
-    arm = samples.rotation @ middle(surface)
-    moment = found[:, 3:] - np.cross(arm, found[:, :3])
-    return np.hstack([found[:, :3], moment / (surface.size / 2)])
-
-
-def errors(whole: Array, reduced: Array, depth: Array) -> Array:
-    """Error of the reduced surface's wrench at each sample [-], shape (n,); see the head of this module."""
-    return _larger(whole - reduced) / _scales(whole, depth)
-
-
-def _larger(wrench: Array) -> Array:
-    sides: Array = np.linalg.norm(wrench.reshape(-1, 2, 3), axis=2).max(axis=1)
-    return sides
-
-
-def _scales(whole: Array, depth: Array) -> Array:
-    """The wrench that the error at each sample is a share of [N], (n,)."""
-    scale = {d: _larger(whole[depth == max(d, SHALLOW)]).max() for d in np.unique(depth)}
-    found: Array = np.maximum([scale[d] for d in depth], 1e-300)
-    return found
+    labels: Labels
+    """Cluster of each triangle of the surface in blocks, see `Surface.clustered`; shape (ntri,)."""
+    error: float
+    """Largest error over the samples [-]."""
+    held_back: float
+    """Largest error over the poses, depths and motions that it is checked at [-]."""
 
 
 def reduced(
@@ -161,71 +65,129 @@ def reduced(
 ) -> tuple[Surface, Economy]:
     """The surface in the fewest facets found that keep the error under a tolerance, itself where none do.
 
-    From a few facets on, those are split whose own force errs most in poses and motions that are drawn anew for each
-    attempt. So neither those that decide nor those held back have been seen.
-
     Args:
         surface: The body's surface.
         bed: Packed sand; its law is the one that is kept.
         tolerance: Largest error [-].
         reach: Gives orientations and motions of the body, by a seed.
     """
+    return put_together(surface, partition(surface, bed, tolerance, reach))
+
+
+def partition(surface: Surface, bed: Array, tolerance: float, reach: Callable[[int], Reach]) -> Partition:
+    """The fewest clusters found whose facets keep the error under a tolerance; arguments as of `reduced`."""
     surface = surface.clustered(BLOCK)
-    areas = surface.areas
-    samples, checks = draw(surface, bed, reach(0), DEPTHS, 0), draw(surface, bed, reach(1), HELD_BACK, 1)
-    whole, checked = scaled_wrenches(surface, bed, samples), scaled_wrenches(surface, bed, checks)
-    points = features(surface, _nearness(samples, layout.record(bed, layout.BED).up))
-    labels: Labels = np.zeros(surface.ntri, dtype=np.intp)
-    full = -(-surface.ntri // BLOCK)
-    blocks, attempt = 0.5 if full > 1 else full, 2
-    while blocks < full:
-        while (lacking := int(blocks * BLOCK) - (int(labels.max()) + 1)) > 0:
-            facets = merged(surface, labels)
-            drawn = draw(surface, bed, reach(attempt), DEPTHS, attempt)
-            some = np.random.default_rng(attempt).permutation(len(drawn.depth))[:STEERING]
-            share = _shares(surface, facets, labels, bed, Samples(*(x[some] for x in drawn)))
-            grown = split(labels, np.argsort(-share)[:lacking], points, areas)
-            attempt += 1
-            if grown.max() == labels.max():
-                return surface, Economy(surface.ntri, surface.ntri, 0.0, 0.0)
-            labels = grown
-        labels = settled(labels, points, areas)
-        facets = merged(surface, labels)
-        error = errors(whole, scaled_wrenches(facets, bed, samples), samples.depth).max()
-        if error <= tolerance:
-            held_back = errors(checked, scaled_wrenches(facets, bed, checks), checks.depth).max()
-            if held_back <= 2 * tolerance:
-                return facets.clustered(BLOCK), Economy(surface.ntri, facets.ntri, float(error), float(held_back))
-        blocks = max(2 * blocks, 1) if blocks < 2 else int(GROWTH * blocks) + 1
-    return surface, Economy(surface.ntri, surface.ntri, 0.0, 0.0)
+    found = _Search(surface, bed, tolerance, reach).fewest() if surface.ntri > BLOCK else None
+    if found is None:
+        return Partition(np.arange(surface.ntri), 0.0, 0.0)
+    return Partition(found.labels, found.error, found.held_back)
 
 
-def _shares(surface: Surface, facets: Surface, labels: Labels, bed: Array, samples: Samples) -> Array:
-    """Each facet's part in the error of the wrench, (nfacet,): squares of the errors of its own force, summed."""
-    bodies = layout.pack_surface(surface), layout.pack_surface(facets)
-    whole, reduced = (scaled_wrenches(body, bed, samples) for body in (surface, facets))
-    scale = _scales(whole, samples.depth)
-    share = np.zeros(facets.ntri)
-    for sample in np.argsort(-_larger(whole - reduced) / scale)[:WORST]:
-        fine, coarse = (evaluate.triangle_stresses(bed, body, *(x[sample] for x in samples[1:]))[0] for body in bodies)
-        force = [np.bincount(labels, column) for column in (fine * surface.areas[:, None]).T]
-        share += ((force - (coarse * facets.areas[:, None]).T) ** 2).sum(axis=0) / scale[sample] ** 2
-    return share
+def put_together(surface: Surface, found: Partition) -> tuple[Surface, Economy]:
+    """The surface of a facet for each cluster, in blocks, and its numbers; itself where each is of one triangle."""
+    surface = surface.clustered(BLOCK)
+    facets = merged(surface, found.labels) if found.labels.max() + 1 < surface.ntri else surface
+    return facets.clustered(BLOCK), Economy(surface.ntri, facets.ntri, found.error, found.held_back)
 
 
-def _nearness(samples: Samples, up: Array) -> Array:
-    """How far apart two centroids are to the sand, see `features`: the identity where a body turns any way.
+def _drawn(
+    surface: Surface, bed: Array, reach: Callable[[int], Reach], seed: int, depths: tuple[float, ...]
+) -> Samples:
+    return draw(surface, bed, reach(seed), depths, seed)
 
-    Depth differs with their distance along the vertical, velocity with that across the axis of rotation; the mean of
-    both over the samples.
+
+class _Attempt(NamedTuple):
+    """Facets, the clusters that they stand for, and their errors."""
+
+    labels: Labels
+    facets: Surface
+    error: float
+    held_back: float
+
+
+class _Search:
+    """The search for the fewest facets; arguments as of `reduced`.
+
+    Facets are split whose own force errs most in the poses and motions of a third draw. So neither the samples that
+    decide nor those held back have been seen.
     """
-    vertical = np.einsum("nji,j->ni", samples.rotation, up)
-    axis = np.einsum("nji,nj->ni", samples.rotation, samples.omega)
-    axis = axis[axis.any(axis=1)]
-    metric = 1.5 * np.einsum("ni,nj->ij", vertical, vertical) / len(vertical)
-    if len(axis):
-        axis = axis / np.linalg.norm(axis, axis=1, keepdims=True)
-        metric += 0.75 * (np.eye(3) - np.einsum("ni,nj->ij", axis, axis) / len(axis))
-    value, vector = np.linalg.eigh(metric)
-    root: Array = (vector * np.sqrt(np.maximum(value, 0.0))) @ vector.T
-    return root
+
+    def __init__(self, surface: Surface, bed: Array, tolerance: float, reach: Callable[[int], Reach]) -> None:
+        self.bed, self.tolerance = bed, tolerance
+        self.drawn = functools.partial(_drawn, surface, bed, reach)
+        corners = surface.corners
+        self.surface = dataclasses.replace(surface, outline=np.array([corners.min(axis=0), corners.max(axis=0)]))
+        self.packed = layout.pack_surface(surface)
+        self.forces: dict[int, Array] = {}
+        self.deciding = Compared(self.surface, bed, self.drawn(DECIDING, DEPTHS))
+        self.steering = Compared(self.surface, bed, some_of(self.drawn(STEERING, DEPTHS), STEERED))
+        self.points = features(surface, nearness(self.deciding.samples, layout.record(bed, layout.BED).up))
+
+    @functools.cached_property
+    def checking(self) -> Compared:
+        """The samples held back, not drawn before something passes."""
+        return Compared(self.surface, self.bed, self.drawn(CHECKING, HELD_BACK))
+
+    def fewest(self) -> _Attempt | None:
+        """The fewest facets that pass, None where no fewer than the triangles do: growing, then between the last."""
+        failed, count = self._attempt(np.zeros(self.surface.ntri, dtype=np.intp)), FEWEST
+        passed = None
+        while passed is None:
+            tried = self._grown(failed, count)
+            if tried is None:
+                return None
+            if self._passes(tried):
+                passed = tried
+            else:
+                failed = tried
+                factor = min(max(math.sqrt(tried.error / self.tolerance), GROWTH[0]), GROWTH[1])
+                count = max(math.ceil(factor * tried.facets.ntri), count + 1)  # some clusters may be lost in settling
+        while passed.facets.ntri > CLOSE * failed.facets.ntri:
+            tried = self._grown(failed, int(math.sqrt(passed.facets.ntri * failed.facets.ntri)))
+            if tried is None or not failed.facets.ntri < tried.facets.ntri < passed.facets.ntri:
+                break
+            passed, failed = (tried, failed) if self._passes(tried) else (passed, tried)
+        return passed
+
+    def _passes(self, tried: _Attempt) -> bool:
+        return tried.error <= self.tolerance and tried.held_back <= 2 * self.tolerance
+
+    def _attempt(self, labels: Labels) -> _Attempt:
+        facets = merged(self.surface, labels)
+        error, held_back = self.deciding.worst(facets, self.tolerance), 0.0
+        if error <= self.tolerance:
+            held_back = self.checking.worst(facets, 2 * self.tolerance)
+        return _Attempt(labels, facets, error, held_back)
+
+    def _grown(self, tried: _Attempt, count: int) -> _Attempt | None:
+        """An attempt of about so many facets; None where they would not be fewer than the triangles."""
+        labels, facets = tried.labels, tried.facets
+        while (lacking := count - facets.ntri) > 0:
+            if count >= self.surface.ntri:
+                return None
+            places = self.points, self.surface.areas
+            shares = spread(labels, *places) if facets.ntri < EVEN else self._shares(labels, facets)
+            labels = split(labels, np.argsort(-shares, kind="stable")[:lacking], *places)
+            if labels.max() + 1 == facets.ntri:
+                return None
+            facets = merged(self.surface, labels)
+        return self._attempt(settled(labels, self.points, self.surface.areas))
+
+    def _shares(self, labels: Labels, facets: Surface) -> Array:
+        """Each facet's part in the error of the wrench, (nfacet,): squares of the errors of its own force, summed."""
+        self.steering.worst(facets, math.inf)
+        packed, share = layout.pack_surface(facets), np.zeros(facets.ntri)
+        for sample in self.steering.order[:WORST].tolist():
+            coarse = self._stresses(packed, sample).T * facets.areas
+            for fine, own in zip(self._forces(sample), coarse, strict=True):
+                share += ((np.bincount(labels, fine) - own) / self.steering.scale[sample]) ** 2
+        return share
+
+    def _forces(self, sample: int) -> Array:
+        """Force on each triangle of the whole surface at a steering sample [N], body frame, (3, ntri)."""
+        if sample not in self.forces:
+            self.forces[sample] = np.ascontiguousarray(self._stresses(self.packed, sample).T * self.surface.areas)
+        return self.forces[sample]
+
+    def _stresses(self, packed: Array, sample: int) -> Array:
+        return evaluate.triangle_stresses(self.bed, packed, *(x[sample] for x in self.steering.samples[1:]))[0]

@@ -169,11 +169,12 @@ FLOOR = """
 def test_own_model_with_a_floor(capsys, tmp_path):
     path = tmp_path / "own.xml"
     path.write_text(FLOOR)
-    warned = json.loads(call(capsys, "inspect", path, "--json")[1])
+    warned = json.loads(call(capsys, "inspect", path, "--json", "--keep-floor")[1])
     assert len(warned["warnings"]) == 1
-    assert "floor" in warned["warnings"][0]
-    quiet = json.loads(call(capsys, "inspect", path, "--json", "--disable-floor")[1])
+    assert "second time" in warned["warnings"][0]
+    quiet = json.loads(call(capsys, "inspect", path, "--json")[1])
     assert quiet["warnings"] == []
+    assert "in the place of geom" in quiet["choices"][0]
     assert quiet["bodies"]["ball"]["triangles"] == quiet["triangles"] > 0
     code, out, _ = call(capsys, "run", path, "--duration", 0.3, "--json")
     assert code == 0

@@ -1,6 +1,11 @@
 """What of a scene can touch sand, how far its joints let it go, and what is modelled of it under a tolerance."""
 
+import functools
+import itertools
 import json
+import os
+import time
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -10,10 +15,15 @@ from trees import SAND, spec_of, xml
 
 import rftsim
 from rftsim import FreeSurface, SceneError, add_sand
+from rftsim.law.laws import get_law
+from rftsim.law.layout import pack_bed
+from rftsim.model.add_sand import read_spec
 from rftsim.model.reach import clearance, sampled_reach
 from rftsim.model.shaping import Fineness, body_surface
+from rftsim.reduction import memory, reduce
 from rftsim.run.advice import advise
 from rftsim.run.scenes import stage
+from rftsim.sand.presets import make_sand
 
 CRANE = """
 <body name="crane" pos="1 0 1">
@@ -134,6 +144,70 @@ def test_a_model_under_a_tolerance_is_a_model():
         rest.append(data.qpos[2])
     assert counts[1] < counts[0] / 10
     assert rest[1] == pytest.approx(rest[0], abs=2e-4)
+
+
+# Its cost -------------------------------------------------------------------------------------------------------------
+
+ROBOTS = Path(os.environ.get("MENAGERIE_ROOT", Path(__file__).parents[3] / "shared" / "robots"))
+FOUR = "".join(
+    f'<body name="leg{i}" pos="{x} {y} 0"><joint axis="0 1 0"/><geom type="ellipsoid" size=".1 .06 .05"/></body>'
+    for i, (x, y) in enumerate(itertools.product((-0.2, 0.2), repeat=2))
+)
+TABLE = f'<body name="table" pos="0 0 1"><freejoint/><geom type="box" size=".3 .3 .02"/>{FOUR}</body>'
+
+
+@pytest.fixture
+def searches(monkeypatch, tmp_path):
+    """Counts the searches for facets; nothing is known from before."""
+    made = []
+
+    def counted(*arguments):
+        made.append(arguments)
+        return reduce.partition(*arguments)
+
+    monkeypatch.setattr(memory, "partition", counted)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    return made
+
+
+def test_equal_legs_are_reduced_once(searches):
+    """Bodies of one shape, whose tree is free, share a search; the next load needs none."""
+    first, again = (add_sand(spec_of(TABLE), SAND, tolerance=0.05) for _ in range(2))
+    assert len(searches) == 2
+    for i in range(4):
+        assert first.economies[f"leg{i}"].elements < first.economies[f"leg{i}"].triangles
+        for bed in (first, again):
+            np.testing.assert_array_equal(bed.surfaces["leg0"].triangles, bed.surfaces[f"leg{i}"].triangles)
+
+
+def test_the_same_facets_every_time(searches):
+    """With no memory of it, too."""
+    spec = spec_of(CRANE)
+    model = spec.compile()
+    surface = surface_of(model, "jib")
+    numbers = pack_bed(make_sand(SAND), get_law("rft3d"), FreeSurface(), (0, 1, 0))
+    reach = functools.partial(sampled_reach, model, model.body("jib").id, surface)
+    pair = [reduce.reduced(surface, numbers, 0.05, reach)[0] for _ in range(2)]
+    np.testing.assert_array_equal(pair[0].triangles, pair[1].triangles)
+
+
+def test_a_robot_is_reduced_in_seconds(searches):
+    """Unitree Go1, on one processor; and at once where it is known."""
+    path = ROBOTS / "unitree_go1" / "go1.xml"
+    if not path.is_file():
+        pytest.skip(f"no {path}")
+    times = []
+    for tolerance in (None, 0.01, 0.01):
+        spec = read_spec(path)
+        start = time.process_time()
+        add_sand(spec, tolerance=tolerance)
+        times.append(time.process_time() - start)
+    plain, first, again = times
+    print(
+        f"{len(searches)} searches; {plain:.2f} s without a tolerance, {first:.2f} s with it, {again:.2f} s once known"
+    )
+    assert first - plain < 5.0
+    assert again - plain < 0.2 * (first - plain)
 
 
 # Laws -----------------------------------------------------------------------------------------------------------------

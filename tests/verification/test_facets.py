@@ -13,7 +13,10 @@ from rftsim import PRESETS, FreeSurface, make_surface, surface_force
 from rftsim.law.laws import get_law
 from rftsim.law.layout import BLOCK, pack_bed
 from rftsim.reduction.facets import merged, settled, split
-from rftsim.reduction.reduce import DEPTHS, HELD_BACK, draw, errors, free_reach, reduced, scaled_wrenches
+from rftsim.reduction.measure import errors, scaled_wrenches
+from rftsim.reduction.reduce import reduced
+from rftsim.reduction.samples import DEPTHS, HELD_BACK, draw, free_reach
+from rftsim.surface.triangles import Surface, Wheel
 
 BED = pack_bed(PRESETS["poppy-seeds"], get_law("rft3d"), FreeSurface(), (0, 1, 0))
 
@@ -118,6 +121,48 @@ def test_the_same_every_time():
     surface = rim(sections=96)
     pair = [reduced(surface, BED, 0.05)[0] for _ in range(2)]
     np.testing.assert_array_equal(pair[0].centres, pair[1].centres)
+
+
+def sheet(*corners, max_edge):
+    surface = Surface(np.array([corners], dtype=float))
+    return surface.refined(max_edge)
+
+
+def boxed(*extents, max_edge):
+    mesh = trimesh.creation.box(extents)
+    return make_surface(mesh.vertices, mesh.faces, allow_open=True).refined(max_edge)
+
+
+ODD = {
+    "one triangle": sheet((0, 0, 0), (1, 0, 0), (0, 1, 0), max_edge=10.0),
+    "flat": sheet((0, 0, 0), (1, 0, 0), (0, 1, 0), max_edge=0.1),
+    "sliver": sheet((0, 0, 0), (1e-3, 0, 0), (0, 0, 1), max_edge=0.05),
+    "many in one place": Surface(np.repeat([[[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]], 100, axis=0)),
+    "twelve": boxed(0.1, 0.1, 0.1, max_edge=1.0),
+    "plate": boxed(0.2, 0.2, 1e-5, max_edge=0.02),
+    "needle": boxed(1e-3, 1e-3, 0.05, max_edge=1e-3),
+    "tiny": boxed(1e-4, 2e-4, 3e-4, max_edge=5e-5),
+    "huge": boxed(50, 30, 20, max_edge=10.0),
+    "far from its origin": boxed(0.1, 0.1, 0.1, max_edge=0.02).moved(np.eye(3), (1000.0, 0.0, 0.0)),
+}
+
+
+@pytest.mark.parametrize("law", ["rft3d", "rft2d", "drft3d", "drft2d"])
+@pytest.mark.parametrize("name", ODD)
+def test_odd_bodies(name, law):
+    """Whatever the body and the law: the errors are within the bounds, or every triangle is kept."""
+    surface = ODD[name]
+    if law.startswith("drft"):
+        surface = dataclasses.replace(surface, wheel=Wheel((0, 1, 0), (0, 0, 0), surface.size / 2))
+    facets, found = reduced(surface, pack_bed(PRESETS["poppy-seeds"], get_law(law), FreeSurface(), (0, 1, 0)), 0.05)
+    assert found.triangles == surface.ntri
+    assert facets.ntri == found.elements <= surface.ntri
+    assert found.error <= 0.05
+    assert found.held_back <= 0.1
+    assert np.isfinite(facets.triangles).all()
+    assert facets.areas.sum() <= surface.areas.sum() * (1 + 1e-9)
+    assert facets.size == surface.size
+    assert facets.wheel == surface.wheel
 
 
 def grousered_wheel():
