@@ -101,13 +101,10 @@ def _placed(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> Array:
 
 def _outline(points: Array, terrain: FreeSurface) -> float:
     """Area of the convex hull of points seen along the terrain's normal [m^2]; zero of fewer than three."""
-    from scipy.spatial import ConvexHull, QhullError  # not at start-up, which it would slow by half a second
+    import manifold3d  # not at start-up, where few models need it
 
     flat = points @ np.linalg.svd(np.array([terrain.normal]))[2][1:].T
-    try:
-        return float(ConvexHull(flat).volume) if len(flat) > 2 else 0.0
-    except QhullError:
-        return 0.0
+    return float(manifold3d.CrossSection.hull_points(np.ascontiguousarray(flat)).area())
 
 
 def _others(count: int) -> str:

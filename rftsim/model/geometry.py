@@ -123,25 +123,26 @@ def hull_triangles(model: mujoco.MjModel, mesh: int) -> Array:
     vertices = model.mesh_vert[model.mesh_vertadr[mesh] :][: model.mesh_vertnum[mesh]].astype(float)
     start = int(model.mesh_graphadr[mesh])
     if start < 0:
-        faces = _convex_hull(vertices, model.mesh(mesh).name)
-    else:  # MuJoCo's layout: two counts, edge addresses and vertex ids, edges, and then the faces
-        nvert, nface = model.mesh_graph[start : start + 2].tolist()
-        first = start + 2 + 2 * nvert + nvert + 3 * nface
-        faces = model.mesh_graph[first : first + 3 * nface].reshape(-1, 3).astype(int)
-    corners: Array = vertices[faces]
+        return _convex_hull(vertices, model.mesh(mesh).name)
+    nvert, nface = model.mesh_graph[start : start + 2].tolist()
+    first = start + 2 + 2 * nvert + nvert + 3 * nface  # two counts, edge addresses, vertex ids, edges, and then faces
+    corners: Array = vertices[model.mesh_graph[first : first + 3 * nface].reshape(-1, 3)]
     a, b, c = np.moveaxis(corners, 1, 0)
     inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), a - corners.mean(axis=(0, 1))) < 0.0
     corners[inward] = corners[inward][:, ::-1]
     return corners
 
 
-def _convex_hull(vertices: Array, name: str) -> Faces:
-    from scipy.spatial import ConvexHull, QhullError  # not at start-up, which it would slow by half a second
+def _convex_hull(vertices: Array, name: str) -> Array:
+    """Triangles of the convex hull of vertices, shape (nface, 3, 3)."""
+    import manifold3d  # not at start-up, where few models need it
 
-    try:
-        return ConvexHull(vertices).simplices.astype(int)  # type: ignore[no-any-return]
-    except QhullError:
-        raise SurfaceError(f"mesh {name} is flat, so that its hull bounds no body: give it a thickness") from None
+    hull = manifold3d.Manifold.hull_points(np.ascontiguousarray(vertices))
+    if not hull.volume() > 1e-9 * float(np.ptp(vertices, axis=0).max()) ** 3:
+        raise SurfaceError(f"mesh {name} is flat, so that its hull bounds no body: give it a thickness")
+    mesh = hull.to_mesh64()
+    corners: Array = np.asarray(mesh.vert_properties)[:, :3][np.asarray(mesh.tri_verts).astype(np.intp)]
+    return corners
 
 
 def _primitive(kind: mujoco.mjtGeom, size: Array, label: str) -> tuple[Array, Faces]:
