@@ -51,7 +51,7 @@ class Run:
     plot: Path | None = None
     """Draw the run, .png, .pdf or .svg."""
     picture: Path | None = None
-    """Render the last moment with the sand's traction as arrows, .png."""
+    """Render the last moment with the sand's forces and tractions as arrows, .png."""
     disable_floor: bool = False
     """Take collision from planes at the sand's level."""
     allow_open: bool = False
@@ -70,7 +70,7 @@ class Run:
         staged = self._stage()
         finished = self._simulate(staged)
         draw(self.plot, plot_history, finished.history, f"{self.scene}, {staged.bed.law.name}")
-        draw(self.picture, save_picture, staged.model, finished.last, staged.measured.body)
+        draw(self.picture, save_picture, staged.model, finished.last)
         if self.json:
             print_json(self._report(staged, finished, warnings()))
             return

@@ -1,82 +1,175 @@
-"""Pictures of a model on sand: the scene as MuJoCo draws it, with the sand's traction as arrows."""
+"""Pictures of a model on sand: the scene as MuJoCo draws it, what is buried showing through, and the sand's forces."""
 
+import contextlib
+import types
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Final, Self, TypeAlias
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from rftsim.law.layout import extent
-from rftsim.model.readout import instances, tractions
+from rftsim.model.readout import sand_planes
 from rftsim.surface.triangles import Array
+from rftsim.view.bounds import bounds, corners
+from rftsim.view.drawing import ALL, Drawing, Shown
 
-ARROW_RGBA = (0.75, 0.12, 0.10, 1.0)
-"""Colour of the arrows of the sand's traction."""
+Picture: TypeAlias = NDArray[np.uint8]
+"""A picture, shape (height, width, 3)."""
+Camera: TypeAlias = int | str | mujoco.MjvCamera
+"""Id or name of a camera of the model, or a free camera."""
+_GEOM = mujoco.mjtGeom
+SIZE: Final = (960, 540)
+"""Width and height of a picture [pixels]."""
+BURIED: Final = 0.45
+"""Share with which what is buried shows through the sand."""
+FILLED: Final = 0.8
+"""Share of the picture that the model takes, in height or in width."""
+AZIMUTH: Final = 118.0
+"""Direction in which a picture's camera looks, from the x axis on [degrees]."""
+ELEVATION: Final = -16.0
+"""Angle by which it looks up [degrees]."""
+
+
+class Pictures:
+    """Takes pictures of one model on sand; closes as a context.
+
+    What is buried shows through the sand. Arrows are the sand's force on each body and, thin, its tractions.
+
+    Args:
+        model: Compiled, with or without sand.
+        width: Width of the pictures [pixels], of any size.
+        height: Height of the pictures [pixels], of any size.
+        shown: The arrows that are drawn.
+    """
+
+    def __init__(self, model: mujoco.MjModel, width: int = SIZE[0], height: int = SIZE[1], shown: Shown = ALL) -> None:
+        with _room(model, width, height):
+            self._renderer = mujoco.Renderer(model, height, width)
+        self._drawing, self._shown = Drawing(model), shown
+        self._sand = sand_planes(model)
+        self._hidden = {int(geom) for geom in np.flatnonzero(_endless(model))} | set(self._sand)
+
+    def take(self, data: mujoco.MjData, camera: Camera = -1) -> Picture:
+        """Draw the model as of the last mj_forward or mj_step of its data; the picture has shape (height, width, 3)."""
+        scene = self._renderer.scene
+        self._renderer.update_scene(data, camera)
+        mine = [i for i in range(scene.ngeom) if scene.geoms[i].objtype == mujoco.mjtObj.mjOBJ_GEOM]
+        self._drawing.draw(scene, data, self._shown)
+        sand = [scene.geoms[i] for i in mine if scene.geoms[i].objid in self._sand]
+        for geom in sand:
+            geom.rgba[3], geom.transparent = 1.0, 0
+        whole: Picture = self._renderer.render().copy()
+        if not sand:
+            return whole
+        for geom in (scene.geoms[i] for i in mine if scene.geoms[i].objid in self._hidden):
+            _vanish(geom)
+        scene.flags[mujoco.mjtRndFlag.mjRND_SKYBOX] = False
+        bare = self._renderer.render()
+        scene.flags[mujoco.mjtRndFlag.mjRND_SKYBOX] = True
+        return _shine_through(whole, bare)
+
+    def close(self) -> None:
+        """Let go of what the pictures need."""
+        self._renderer.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: types.TracebackType | None
+    ) -> None:
+        self.close()
 
 
 def render(
     model: mujoco.MjModel,
     data: mujoco.MjData,
     *,
-    camera: "int | str | mujoco.MjvCamera" = -1,
-    width: int = 960,
-    height: int = 540,
-    arrows: float = 0.0,
-) -> NDArray[np.uint8]:
-    """Draw a model as MuJoCo does; the picture has shape (height, width, 3).
+    camera: "Camera | None" = None,
+    width: int = SIZE[0],
+    height: int = SIZE[1],
+    shown: Shown = ALL,
+) -> Picture:
+    """Draw a model on sand, see `Pictures`; the picture has shape (height, width, 3).
 
     Args:
-        model: A model with sand.
+        model: Compiled, with or without sand.
         data: Its data after mj_forward or mj_step.
-        camera: Id or name of a camera of the model, or a free camera.
-        width: Width of the picture [pixels]; at most that of the model's offscreen buffer.
-        height: Height of the picture [pixels], likewise.
-        arrows: Length of the arrow of the largest traction [m]; zero draws none.
+        camera: A camera; by default one that shows everything that can move.
+        width: Width of the picture [pixels].
+        height: Height of the picture [pixels].
+        shown: The arrows that are drawn.
     """
-    options = mujoco.MjvOption()
-    with mujoco.Renderer(model, height, width) as renderer:
-        renderer.update_scene(data, camera, options)
-        if arrows > 0.0:
-            draw_tractions(renderer.scene, model, data, arrows)
-        picture: NDArray[np.uint8] = renderer.render().copy()
-    return picture
+    with Pictures(model, width, height, shown) as pictures:
+        return pictures.take(data, framing(model, data, width / height) if camera is None else camera)
 
 
-def watching(model: mujoco.MjModel, data: mujoco.MjData, body: str) -> mujoco.MjvCamera:
-    """Make a free camera that looks at a body from the side, slightly from above."""
+def framing(model: mujoco.MjModel, data: mujoco.MjData, aspect: float = SIZE[0] / SIZE[1]) -> mujoco.MjvCamera:
+    """Make a free camera that shows everything that can move, from the side and slightly from above.
+
+    Args:
+        model: Compiled.
+        data: Its data after mj_forward or mj_step.
+        aspect: Width over height of the picture.
+    """
     camera = mujoco.MjvCamera()
-    camera.lookat[:] = data.xpos[model.body(body).id]
-    own = [bed.bodies[model.body(body).id] for bed in instances(model) if model.body(body).id in bed.bodies]
-    size = max((extent(surface) for surface in own), default=model.stat.extent)
-    camera.distance, camera.azimuth, camera.elevation = 2.2 * size, 115.0, -14.0
+    camera.azimuth, camera.elevation = AZIMUTH, ELEVATION
+    camera.lookat[:], extent = bounds(model, data)
+    ahead, right, up = _axes(camera)
+    tangent = FILLED * np.tan(0.5 * np.radians(model.vis.global_.fovy))
+    arms = corners(model, data) - camera.lookat
+    wanted = np.maximum(np.abs(arms @ up) / tangent, np.abs(arms @ right) / (tangent * aspect)) - arms @ ahead
+    camera.distance = max(float(wanted.max(initial=0.0)), 0.5 * extent)
     return camera
 
 
-def save_picture(model: mujoco.MjModel, data: mujoco.MjData, body: str, path: Path) -> None:
-    """Render a model, looking at a body, with arrows for the sand's traction, and write the picture to a file."""
+def save_picture(model: mujoco.MjModel, data: mujoco.MjData, path: Path) -> None:
+    """Draw everything of a model that can move, with the sand's forces, and write the picture to a file."""
     mujoco.mj_forward(model, data)
-    camera = watching(model, data, body)
-    picture = render(model, data, camera=camera, arrows=camera.distance / 10)
+    picture = render(model, data)
     import matplotlib.image
 
     matplotlib.image.imsave(path, picture)
 
 
-def draw_tractions(scene: mujoco.MjvScene, model: mujoco.MjModel, data: mujoco.MjData, length: float) -> None:
-    """Add an arrow per active triangle to a scene; the largest traction is `length` [m] long."""
-    pressed = [tractions(model, data, body) for bed in instances(model) for body in bed.bodies]
-    largest = max((np.linalg.norm(t.stress, axis=1).max() for t in pressed), default=0.0)
-    if largest == 0.0:
-        return
-    for triangles in pressed:
-        for centre, stress in zip(triangles.centre[triangles.active], triangles.stress[triangles.active], strict=True):
-            vector = stress * (length / largest)
-            if scene.ngeom < scene.maxgeom and np.linalg.norm(vector) >= 0.02 * length:
-                _add_arrow(scene, centre - vector, centre, length / 40)  # it ends where it pushes
+def _axes(camera: mujoco.MjvCamera) -> tuple[Array, Array, Array]:
+    """Unit vectors ahead of a free camera, to its right and up, shape (3,) each."""
+    turn, lift = np.radians([camera.azimuth, camera.elevation])
+    ahead = np.array([np.cos(lift) * np.cos(turn), np.cos(lift) * np.sin(turn), np.sin(lift)])
+    right = np.array([np.sin(turn), -np.cos(turn), 0.0])
+    return ahead, right, np.cross(right, ahead)
 
 
-def _add_arrow(scene: mujoco.MjvScene, tail: Array, tip: Array, width: float) -> None:
-    geom, arrow = scene.geoms[scene.ngeom], mujoco.mjtGeom.mjGEOM_ARROW
-    mujoco.mjv_initGeom(geom, arrow, np.zeros(3), np.zeros(3), np.zeros(9), np.array(ARROW_RGBA, np.float32))
-    mujoco.mjv_connector(geom, arrow, width, tail, tip)
-    scene.ngeom += 1
+def _endless(model: mujoco.MjModel) -> "NDArray[np.bool_]":
+    """Whether each geom is ground: a plane or height field that cannot move, shape (ngeom,)."""
+    ground = np.isin(model.geom_type, [int(_GEOM.mjGEOM_PLANE), int(_GEOM.mjGEOM_HFIELD)])
+    still: NDArray[np.bool_] = ground & (model.body_weldid[model.geom_bodyid] == 0)
+    return still
+
+
+def _vanish(geom: mujoco.MjvGeom) -> None:
+    """Let nothing of a geom of a scene be seen."""
+    geom.rgba[3], geom.transparent = 0.0, 1
+    if geom.type == _GEOM.mjGEOM_PLANE:
+        geom.size[:] = 1e-6
+
+
+def _shine_through(whole: Picture, bare: Picture) -> Picture:
+    """Mix a picture with that of the same things without sand, where there is any; elsewhere both are the same."""
+    there = bare.any(axis=2, keepdims=True)
+    mixed = np.where(there, (1.0 - BURIED) * whole + BURIED * bare, whole)
+    return mixed.round().astype(np.uint8)
+
+
+@contextlib.contextmanager
+def _room(model: mujoco.MjModel, width: int, height: int) -> Iterator[None]:
+    """A context in which a model's offscreen buffer has room for a picture; contexts of OpenGL that it made keep it."""
+    size = model.vis.global_
+    kept = size.offwidth, size.offheight
+    size.offwidth, size.offheight = max(width, kept[0]), max(height, kept[1])
+    try:
+        yield
+    finally:
+        size.offwidth, size.offheight = kept
