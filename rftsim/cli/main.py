@@ -10,6 +10,7 @@ from rich.markup import escape
 
 from rftsim.cli.bench import Bench
 from rftsim.cli.demo import Demo
+from rftsim.cli.drop import Drop
 from rftsim.cli.evaluate import Evaluate
 from rftsim.cli.fit import Fit
 from rftsim.cli.force import Force
@@ -24,6 +25,7 @@ from rftsim.errors import RftsimError, RftsimWarning
 Command = (
     Annotated[Force, tyro.conf.subcommand("force")]
     | Annotated[Run, tyro.conf.subcommand("run")]
+    | Annotated[Drop, tyro.conf.subcommand("drop")]
     | Annotated[Inspect, tyro.conf.subcommand("inspect")]
     | Annotated[Fit, tyro.conf.subcommand("fit")]
     | Annotated[Demo, tyro.conf.subcommand("demo")]

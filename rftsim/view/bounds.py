@@ -1,4 +1,4 @@
-"""The size and weight of everything in a model that can move, to which views and arrows are scaled."""
+"""The size of everything in a model that can move, to which views and arrows are scaled."""
 
 import mujoco
 import numpy as np
@@ -26,12 +26,6 @@ def bounds(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[Array, float]:
         return model.stat.center.copy(), float(model.stat.extent)
     low, high = points.min(axis=0), points.max(axis=0)
     return 0.5 * (low + high), float((high - low).max())
-
-
-def moving_weight(model: mujoco.MjModel) -> float:
-    """The weight of everything that can move, less what MuJoCo compensates [N]."""
-    own = model.body_mass * (1.0 - model.body_gravcomp)
-    return float(own[_moving(model)].sum() * np.linalg.norm(model.opt.gravity))
 
 
 def _moving(model: mujoco.MjModel) -> "NDArray[np.bool_]":

@@ -100,7 +100,8 @@ def _fixed(portrait: Portrait, force_scale: float, traction_scale: float) -> Ite
     """The entities that stay as they are, each with its shape, text or style."""
     about = (
         f"**Arrows**, from the surface above where it acts: the sand's force, {portrait.extent:.3g} m long for "
-        f"{force_scale:.3g} N. **Colours**: traction, darkest from {traction_scale:.3g} Pa on; grey where the sand does not act. **Grid**: {portrait.cell:g} m."
+        f"{force_scale:.3g} N. **Colours**: traction, darkest from {traction_scale:.3g} Pa on; grey where sand does "
+        f"not act. **Grid**: {portrait.cell:g} m."
     )
     yield "/about", rr.TextDocument(about, media_type="text/markdown")
     yield "/world", rr.ViewCoordinates.RIGHT_HAND_Z_UP

@@ -6,8 +6,9 @@ import mujoco
 import numpy as np
 
 from rftsim.model.readout import instances, tractions
+from rftsim.model.standing import moving_weight
 from rftsim.surface.triangles import Array
-from rftsim.view.bounds import bounds, moving_weight
+from rftsim.view.bounds import bounds
 from rftsim.view.forces import resultants
 
 _GEOM = mujoco.mjtGeom

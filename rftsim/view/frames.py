@@ -10,8 +10,9 @@ from scipy.spatial import cKDTree
 
 from rftsim.model.geometry import body_surface, is_colliding
 from rftsim.model.readout import Instance, body_velocities, instances, tractions, wrenches
+from rftsim.model.standing import moving_weight
 from rftsim.surface.triangles import Array
-from rftsim.view.bounds import bounds, moving_weight
+from rftsim.view.bounds import bounds
 from rftsim.view.forces import resultants
 
 
