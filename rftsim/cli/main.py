@@ -20,12 +20,14 @@ from rftsim.cli.play import Play
 from rftsim.cli.run import Run
 from rftsim.cli.train import Train
 from rftsim.cli.validate import Validate
+from rftsim.cli.view import View
 from rftsim.errors import RftsimError, RftsimWarning
 
 Command = (
     Annotated[Force, tyro.conf.subcommand("force")]
     | Annotated[Run, tyro.conf.subcommand("run")]
     | Annotated[Drop, tyro.conf.subcommand("drop")]
+    | Annotated[View, tyro.conf.subcommand("view")]
     | Annotated[Inspect, tyro.conf.subcommand("inspect")]
     | Annotated[Fit, tyro.conf.subcommand("fit")]
     | Annotated[Demo, tyro.conf.subcommand("demo")]

@@ -19,7 +19,7 @@ from rftsim.run.run import SAMPLES, run
 from rftsim.run.run import Run as Finished
 from rftsim.run.scenes import Staged
 from rftsim.view.history import plot_history
-from rftsim.view.render import save_picture
+from rftsim.view.render import Pictures, save_picture
 
 
 @dataclasses.dataclass(frozen=True)
@@ -59,9 +59,11 @@ class Run(Scene):
         if self.picture:
             check_writable(self.picture, ".png")
         staged = self._stage()
-        finished = self._simulate(staged)
-        draw(self.plot, plot_history, finished.history, f"{self.scene}, {staged.bed.law.name}")
-        draw(self.picture, save_picture, staged.model, finished.last)
+        with contextlib.ExitStack() as stack:
+            pictures = stack.enter_context(Pictures(staged.model)) if self.picture else None  # fails now, or not at all
+            finished = self._simulate(staged)
+            draw(self.plot, plot_history, finished.history, f"{self.scene}, {staged.bed.law.name}")
+            draw(self.picture, save_picture, pictures, finished.last)
         if self.json:
             print_json(self._report(staged, finished, warnings()))
             return

@@ -2,6 +2,7 @@
 
 import contextlib
 import types
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Final, Self, TypeAlias
@@ -10,6 +11,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from rftsim.errors import RftsimError
 from rftsim.model.readout import sand_planes
 from rftsim.surface.triangles import Array
 from rftsim.view.bounds import bounds, corners
@@ -42,17 +44,27 @@ class Pictures:
         width: Width of the pictures [pixels], of any size.
         height: Height of the pictures [pixels], of any size.
         shown: The arrows that are drawn.
+
+    Raises:
+        RftsimError: There is no OpenGL to draw with.
     """
 
     def __init__(self, model: mujoco.MjModel, width: int = SIZE[0], height: int = SIZE[1], shown: Shown = ALL) -> None:
-        with _room(model, width, height):
-            self._renderer = mujoco.Renderer(model, height, width)
+        self._aspect = width / height
+        self._renderer = _renderer(model, width, height)
         self._drawing, self._shown = Drawing(model), shown
         self._sand = sand_planes(model)
         self._hidden = {int(geom) for geom in np.flatnonzero(_endless(model))} | set(self._sand)
 
-    def take(self, data: mujoco.MjData, camera: Camera = -1) -> Picture:
-        """Draw the model as of the last mj_forward or mj_step of its data; the picture has shape (height, width, 3)."""
+    def take(self, data: mujoco.MjData, camera: "Camera | None" = None) -> Picture:
+        """Draw the model as of the last mj_forward or mj_step of its data; the picture has shape (height, width, 3).
+
+        Args:
+            data: The model's data.
+            camera: A camera; by default one that shows everything that can move.
+        """
+        if camera is None:
+            camera = framing(self._drawing.model, data, self._aspect)
         scene = self._renderer.scene
         self._renderer.update_scene(data, camera)
         mine = [i for i in range(scene.ngeom) if scene.geoms[i].objtype == mujoco.mjtObj.mjOBJ_GEOM]
@@ -103,7 +115,7 @@ def render(
         shown: The arrows that are drawn.
     """
     with Pictures(model, width, height, shown) as pictures:
-        return pictures.take(data, framing(model, data, width / height) if camera is None else camera)
+        return pictures.take(data, camera)
 
 
 def framing(model: mujoco.MjModel, data: mujoco.MjData, aspect: float = SIZE[0] / SIZE[1]) -> mujoco.MjvCamera:
@@ -125,10 +137,9 @@ def framing(model: mujoco.MjModel, data: mujoco.MjData, aspect: float = SIZE[0] 
     return camera
 
 
-def save_picture(model: mujoco.MjModel, data: mujoco.MjData, path: Path) -> None:
-    """Draw everything of a model that can move, with the sand's forces, and write the picture to a file."""
-    mujoco.mj_forward(model, data)
-    picture = render(model, data)
+def save_picture(pictures: Pictures, data: mujoco.MjData, path: Path) -> None:
+    """Take a picture of everything that can move, as of the last step of its data, and write it to a file."""
+    picture = pictures.take(data)
     import matplotlib.image
 
     matplotlib.image.imsave(path, picture)
@@ -161,6 +172,18 @@ def _shine_through(whole: Picture, bare: Picture) -> Picture:
     there = bare.any(axis=2, keepdims=True)
     mixed = np.where(there, (1.0 - BURIED) * whole + BURIED * bare, whole)
     return mixed.round().astype(np.uint8)
+
+
+def _renderer(model: mujoco.MjModel, width: int, height: int) -> mujoco.Renderer:
+    """MuJoCo's renderer of a model, for pictures of any size."""
+    with _room(model, width, height), warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # GLFW's, which the error says better
+        try:
+            return mujoco.Renderer(model, height, width)
+        except mujoco.FatalError as error:
+            raise RftsimError(
+                "no OpenGL to draw with: on a machine without a display set MUJOCO_GL=egl, or MUJOCO_GL=osmesa"
+            ) from error
 
 
 @contextlib.contextmanager
