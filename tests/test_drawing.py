@@ -35,14 +35,14 @@ def drawn(model, data, **shown):
     return [scene.geoms[i] for i in range(scene.ngeom)]
 
 
-def arrows(geoms, rgba):
-    return [geom for geom in geoms if geom.type == mujoco.mjtGeom.mjGEOM_ARROW and np.allclose(geom.rgba, rgba)]
+def of_type(geoms, kind):
+    return [geom for geom in geoms if geom.type == kind]
 
 
 def test_a_force_is_an_arrow_from_the_surface_as_long_as_its_share_of_the_weight(rest):
     model, data = rest
     geoms = drawn(model, data, tractions=False)
-    found = arrows(geoms, drawing.FORCE_RGBA)
+    found = of_type(geoms, mujoco.mjtGeom.mjGEOM_ARROW)
     extent = bounds(model, data)[1]
     assert len(found) == 2
     for arrow, place, mass in zip(found, ((0, 0), (0.4, 0)), (12, 2), strict=True):
@@ -54,12 +54,17 @@ def test_a_force_is_an_arrow_from_the_surface_as_long_as_its_share_of_the_weight
 
 def test_tractions_end_on_the_triangles_that_they_press(rest):
     model, data = rest
-    found = arrows(drawn(model, data, forces=False), drawing.TRACTION_RGBA)
+    found = of_type(drawn(model, data, forces=False), mujoco.mjtGeom.mjGEOM_LINE)
     pressed = [rftsim.tractions(model, data, name) for name in ("box", "ball")]
     centres = np.concatenate([one.centre[one.active] for one in pressed])
-    tips = np.array([arrow.pos + arrow.mat[:, 2] * arrow.size[2] / 2 for arrow in found])
+    tips = np.array([line.pos + line.mat[:, 2] * line.size[2] for line in found])
     assert 0 < len(tips) <= len(centres)
     assert np.linalg.norm(tips[:, None] - centres, axis=2).min(axis=1).max() < 1e-6
+
+
+def test_of_many_triangles_some_have_a_line(rest, monkeypatch):
+    monkeypatch.setattr(drawing, "MOST", 20)
+    assert 10 < len(of_type(drawn(*rest, forces=False), mujoco.mjtGeom.mjGEOM_LINE)) <= 20
 
 
 def test_a_full_scene_takes_no_more(rest):

@@ -13,21 +13,23 @@ from rftsim.view.forces import resultants
 
 _GEOM = mujoco.mjtGeom
 TRACTION_RGBA: Final = (0.80, 0.10, 0.08, 1.0)
-"""Colour of the arrows of the sand's traction."""
+"""Colour of the lines of the sand's traction."""
 FORCE_RGBA: Final = (0.16, 0.47, 1.0, 1.0)
 """Colour of the arrows of the sand's force on a body."""
 WEIGHT_LENGTH: Final = 0.8
 """Length of the arrow of a force as large as the weight, over the extent of what can move."""
-LONGEST: Final = 1.5
+LONGEST: Final = 1.0
 """Length of the longest arrow that is drawn, over the same."""
 TRACTION_LENGTH: Final = 0.08
-"""Length of the arrow of the largest traction, over the same."""
+"""Length of the line of the largest traction, over the same."""
+MOST: Final = 1500
+"""Lines of tractions, about, at most; of more triangles every few has one."""
 FAINTEST: Final = 0.01
 """Force, over the weight, below which none is drawn."""
 FORCE_WIDTH: Final = 0.011
 """Half the width of a force's arrow, over the extent of what can move."""
-TRACTION_WIDTH: Final = 0.0016
-"""The same of a traction's."""
+TRACTION_WIDTH: Final = 2.0
+"""Width of a traction's line [pixels]."""
 
 
 class Shown(NamedTuple):
@@ -36,7 +38,7 @@ class Shown(NamedTuple):
     forces: bool = True
     """An arrow for the sand's force on each body, from the surface, with its size."""
     tractions: bool = True
-    """An arrow for each triangle that the sand presses on, which ends where it acts."""
+    """A line for each triangle that the sand presses on, which ends where it acts."""
 
 
 ALL: Final = Shown()
@@ -62,10 +64,10 @@ class Drawing:
 
         A scene that is full is left so.
         """
-        if shown.tractions:
-            self._draw_tractions(scene, data)
         if shown.forces:
             self._draw_forces(scene, data)
+        if shown.tractions:
+            self._draw_tractions(scene, data)
 
     def _draw_forces(self, scene: mujoco.MjvScene, data: mujoco.MjData) -> None:
         found = resultants(self.model, data)
@@ -84,12 +86,12 @@ class Drawing:
         largest = max((float(np.linalg.norm(one.stress, axis=1).max()) for one in pressed), default=0.0)
         if largest == 0.0:
             return
-        length, width = TRACTION_LENGTH * self.extent, TRACTION_WIDTH * self.extent
-        for one in pressed:
-            vectors = one.stress * (length / largest)
-            drawn = one.active & (np.linalg.norm(vectors, axis=1) >= 0.05 * length)
-            for centre, vector in zip(one.centre[drawn], vectors[drawn], strict=True):
-                _add_arrow(scene, centre - vector, centre, width, TRACTION_RGBA)  # it ends where it pushes
+        length = TRACTION_LENGTH * self.extent
+        centres = np.concatenate([one.centre[one.active] for one in pressed])
+        vectors = np.concatenate([one.stress[one.active] for one in pressed]) * (length / largest)
+        drawn = np.flatnonzero(np.linalg.norm(vectors, axis=1) >= 0.05 * length)
+        for i in drawn[:: -(-len(drawn) // MOST)]:
+            _add_line(scene, centres[i] - vectors[i], centres[i], TRACTION_RGBA)  # it ends where it pushes
 
 
 def _add_arrow(scene: mujoco.MjvScene, tail: Array, tip: Array, width: float, rgba: tuple[float, ...]) -> None:
@@ -97,6 +99,12 @@ def _add_arrow(scene: mujoco.MjvScene, tail: Array, tip: Array, width: float, rg
     if geom is not None:
         mujoco.mjv_connector(geom, _GEOM.mjGEOM_ARROW, width, tail, tip)
         geom.size[2] *= 2.0  # MuJoCo draws arrows half as long
+
+
+def _add_line(scene: mujoco.MjvScene, tail: Array, tip: Array, rgba: tuple[float, ...]) -> None:
+    geom = _new_geom(scene, _GEOM.mjGEOM_LINE, tail, rgba)
+    if geom is not None:
+        mujoco.mjv_connector(geom, _GEOM.mjGEOM_LINE, TRACTION_WIDTH, tail, tip)
 
 
 def _add_label(scene: mujoco.MjvScene, place: Array, text: str) -> None:

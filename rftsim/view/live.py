@@ -15,6 +15,7 @@ from rftsim.model.readout import instances, sand_planes
 from rftsim.model.standing import moving_weight
 from rftsim.run.robot import total_force
 from rftsim.view.drawing import Drawing, Shown
+from rftsim.view.look import dress
 from rftsim.view.render import framing
 
 FRAME: Final = 1.0 / 60.0
@@ -34,6 +35,7 @@ KEYS: Final = (
     ("6", "forces"),
     ("7", "tractions"),
     ("8", "opacity of the sand"),
+    ("T", "see through the model"),
     ("double click, Ctrl + drag", "choose a body, push it"),
 )
 """The keys, and what each does."""
@@ -77,6 +79,7 @@ class Live:
         self.paused = False
         self.strength = 1.0
         self._drawing, self._opacity, self._owed = Drawing(model), 0, 0.0
+        dress(model, self._drawing.extent)
         self._cover()
         self._pressed: list[int] = []
 

@@ -1,9 +1,8 @@
 """Pictures of a model on sand: the scene as MuJoCo draws it, what is buried showing through, and the sand's forces."""
 
-import contextlib
+import math
 import types
 import warnings
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Final, Self, TypeAlias
 
@@ -12,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rftsim.errors import RftsimError
-from rftsim.model.readout import sand_planes
+from rftsim.model.readout import instances
 from rftsim.surface.triangles import Array
 from rftsim.view.bounds import bounds, corners
 from rftsim.view.drawing import ALL, Drawing, Shown
+from rftsim.view.look import repeats, roomy
 
 Picture: TypeAlias = NDArray[np.uint8]
 """A picture, shape (height, width, 3)."""
@@ -25,19 +25,24 @@ _GEOM = mujoco.mjtGeom
 SIZE: Final = (960, 540)
 """Width and height of a picture [pixels]."""
 BURIED: Final = 0.45
-"""Share with which what is buried shows through the sand."""
+"""Share with which what is buried shows through the sand; what is not is the same in both."""
+FORCES: Final = 0.85
+"""Share with which the arrows of forces show through everything."""
 FILLED: Final = 0.8
 """Share of the picture that the model takes, in height or in width."""
 AZIMUTH: Final = 118.0
 """Direction in which a picture's camera looks, from the x axis on [degrees]."""
-ELEVATION: Final = -16.0
-"""Angle by which it looks up [degrees]."""
+ELEVATIONS: Final = (-16.0, -24.0, -32.0, -45.0, -60.0)
+"""Angles by which it may look up [degrees]; the first from which it is well above the sand."""
+ABOVE: Final = 0.4
+"""Height over the sand at which it is well above it, over the extent of what can move."""
 
 
 class Pictures:
     """Takes pictures of one model on sand; closes as a context.
 
-    What is buried shows through the sand. Arrows are the sand's force on each body and, thin, its tractions.
+    What is buried shows through the sand. Arrows are the sand's force on each body, before all else; lines are its
+    tractions.
 
     Args:
         model: Compiled, with or without sand.
@@ -51,9 +56,9 @@ class Pictures:
 
     def __init__(self, model: mujoco.MjModel, width: int = SIZE[0], height: int = SIZE[1], shown: Shown = ALL) -> None:
         self._aspect = width / height
-        self._renderer = _renderer(model, width, height)
         self._drawing, self._shown = Drawing(model), shown
-        self._sand = sand_planes(model)
+        self._renderer = _renderer(model, self._drawing.extent, width, height)
+        self._sand = repeats(model, self._drawing.extent)
         self._hidden = {int(geom) for geom in np.flatnonzero(_endless(model))} | set(self._sand)
 
     def take(self, data: mujoco.MjData, camera: "Camera | None" = None) -> Picture:
@@ -69,18 +74,27 @@ class Pictures:
         self._renderer.update_scene(data, camera)
         mine = [i for i in range(scene.ngeom) if scene.geoms[i].objtype == mujoco.mjtObj.mjOBJ_GEOM]
         self._drawing.draw(scene, data, self._shown)
-        sand = [scene.geoms[i] for i in mine if scene.geoms[i].objid in self._sand]
-        for geom in sand:
-            geom.rgba[3], geom.transparent = 1.0, 0
+        for geom in (scene.geoms[i] for i in mine if scene.geoms[i].objid in self._sand):
+            geom.rgba[3], geom.transparent, geom.texrepeat[:] = 1.0, 0, self._sand[geom.objid]
         whole: Picture = self._renderer.render().copy()
-        if not sand:
-            return whole
-        for geom in (scene.geoms[i] for i in mine if scene.geoms[i].objid in self._hidden):
-            _vanish(geom)
-        scene.flags[mujoco.mjtRndFlag.mjRND_SKYBOX] = False
-        bare = self._renderer.render()
-        scene.flags[mujoco.mjtRndFlag.mjRND_SKYBOX] = True
-        return _shine_through(whole, bare)
+        if self._sand:
+            for geom in (scene.geoms[i] for i in mine if scene.geoms[i].objid in self._hidden):
+                _vanish(geom)
+            whole = _shine_through(whole, self._alone(), BURIED)
+        if self._shown.forces:
+            self._renderer.update_scene(data, camera, _nothing())
+            self._drawing.draw(scene, data, self._shown._replace(tractions=False))
+            whole = _shine_through(whole, self._alone(), FORCES)
+        return whole
+
+    def _alone(self) -> Picture:
+        """The picture of what is in the scene now, on black."""
+        flags, sky = self._renderer.scene.flags, int(mujoco.mjtRndFlag.mjRND_SKYBOX)
+        kept = flags[sky]
+        flags[sky] = False
+        picture: Picture = self._renderer.render()
+        flags[sky] = kept
+        return picture
 
     def close(self) -> None:
         """Let go of what the pictures need."""
@@ -127,13 +141,16 @@ def framing(model: mujoco.MjModel, data: mujoco.MjData, aspect: float = SIZE[0] 
         aspect: Width over height of the picture.
     """
     camera = mujoco.MjvCamera()
-    camera.azimuth, camera.elevation = AZIMUTH, ELEVATION
+    camera.azimuth = AZIMUTH
     camera.lookat[:], extent = bounds(model, data)
-    ahead, right, up = _axes(camera)
     tangent = FILLED * np.tan(0.5 * np.radians(model.vis.global_.fovy))
     arms = corners(model, data) - camera.lookat
-    wanted = np.maximum(np.abs(arms @ up) / tangent, np.abs(arms @ right) / (tangent * aspect)) - arms @ ahead
-    camera.distance = max(float(wanted.max(initial=0.0)), 0.5 * extent)
+    for camera.elevation in ELEVATIONS:
+        ahead, right, up = _axes(camera)
+        wanted = np.maximum(np.abs(arms @ up) / tangent, np.abs(arms @ right) / (tangent * aspect)) - arms @ ahead
+        camera.distance = max(float(wanted.max(initial=0.0)), 0.5 * extent)
+        if _height(model, camera.lookat - camera.distance * ahead) > ABOVE * extent:
+            break
     return camera
 
 
@@ -143,6 +160,11 @@ def save_picture(pictures: Pictures, data: mujoco.MjData, path: Path) -> None:
     import matplotlib.image
 
     matplotlib.image.imsave(path, picture)
+
+
+def _height(model: mujoco.MjModel, place: Array) -> float:
+    """Height of a place over the highest sand [m]; infinite where there is none."""
+    return min((float(one.bed.up @ place - one.bed.offset) for one in instances(model)), default=math.inf)
 
 
 def _axes(camera: mujoco.MjvCamera) -> tuple[Array, Array, Array]:
@@ -167,16 +189,23 @@ def _vanish(geom: mujoco.MjvGeom) -> None:
         geom.size[:] = 1e-6
 
 
-def _shine_through(whole: Picture, bare: Picture) -> Picture:
-    """Mix a picture with that of the same things without sand, where there is any; elsewhere both are the same."""
+def _nothing() -> mujoco.MjvOption:
+    """Make options under which a scene has cameras and lights and nothing of the model."""
+    options = mujoco.MjvOption()
+    for group in ("geom", "site", "joint", "tendon", "actuator", "flex", "skin"):
+        getattr(options, f"{group}group")[:] = 0
+    return options
+
+
+def _shine_through(whole: Picture, bare: Picture, share: float) -> Picture:
+    """Mix a picture with another one, of a share, where that is not black."""
     there = bare.any(axis=2, keepdims=True)
-    mixed = np.where(there, (1.0 - BURIED) * whole + BURIED * bare, whole)
-    return mixed.round().astype(np.uint8)
+    return np.where(there, ((1.0 - share) * whole + share * bare).round(), whole).astype(np.uint8)
 
 
-def _renderer(model: mujoco.MjModel, width: int, height: int) -> mujoco.Renderer:
+def _renderer(model: mujoco.MjModel, extent: float, width: int, height: int) -> mujoco.Renderer:
     """MuJoCo's renderer of a model, for pictures of any size."""
-    with _room(model, width, height), warnings.catch_warnings():
+    with roomy(model, extent, width, height), warnings.catch_warnings():
         warnings.simplefilter("ignore")  # GLFW's, which the error says better
         try:
             return mujoco.Renderer(model, height, width)
@@ -184,15 +213,3 @@ def _renderer(model: mujoco.MjModel, width: int, height: int) -> mujoco.Renderer
             raise RftsimError(
                 "no OpenGL to draw with: on a machine without a display set MUJOCO_GL=egl, or MUJOCO_GL=osmesa"
             ) from error
-
-
-@contextlib.contextmanager
-def _room(model: mujoco.MjModel, width: int, height: int) -> Iterator[None]:
-    """A context in which a model's offscreen buffer has room for a picture; contexts of OpenGL that it made keep it."""
-    size = model.vis.global_
-    kept = size.offwidth, size.offheight
-    size.offwidth, size.offheight = max(width, kept[0]), max(height, kept[1])
-    try:
-        yield
-    finally:
-        size.offwidth, size.offheight = kept

@@ -68,6 +68,14 @@ def test_run_measures_the_robot(capsys, robot):
     assert f"% of {WEIGHT:.4g} N" in said
 
 
+def test_a_picture_of_any_model(capsys, robot, tmp_path):
+    """The model's own offscreen buffer, of 640 x 480, is too small for it."""
+    picture = tmp_path / "robot.png"
+    report(capsys, "run", robot, "--duration", 0.05, "--picture", picture)
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert int.from_bytes(picture.read_bytes()[16:20], "big") == 960
+
+
 def test_run_without_settling_falls(capsys, robot):
     """From 0.5 m the feet are 0.26 m above the sand at first."""
     found = report(capsys, "run", robot, "--duration", 0.1, "--no-settle")
