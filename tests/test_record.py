@@ -128,6 +128,16 @@ def test_arrows_are_forces_to_one_scale(drop):
     assert scale == pytest.approx(length / force, rel=0.01)
 
 
+def test_arrows_start_at_the_surface_above_where_the_force_acts(drop):
+    _, contents, truth = drop
+    up = np.array(UPWARD) / np.linalg.norm(UPWARD)
+    starts = np.array(contents["/world/force/ball"]["Arrows3D:origins"])[:, 0]
+    pressed = [sand.force[1].any() for _, sand, *_ in truth]
+    assert any(pressed)
+    assert starts[pressed] @ up == pytest.approx(0.01 * up[2], abs=1e-6)
+    assert np.linalg.norm(starts - [xpos[1] for *_, xpos, _, _ in truth], axis=1).max() < 0.15
+
+
 def test_the_sand_stays_below_the_bodies_in_its_plane(drop):
     _, contents, truth = drop
     up = np.array(UPWARD) / np.linalg.norm(UPWARD)

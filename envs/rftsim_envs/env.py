@@ -3,11 +3,11 @@
 from typing import Any, Literal
 
 import gymnasium as gym
-import mujoco
 import numpy as np
 from gymnasium.utils import EzPickle
 from numpy.typing import ArrayLike, NDArray
 
+from rftsim.view.render import Pictures
 from rftsim_envs import ground, tasks
 from rftsim_envs.episodes import Episodes, Observation
 from rftsim_envs.physics import One
@@ -53,7 +53,7 @@ class SandEnv(gym.Env[Observation, Action], EzPickle):
         self.metadata = self.metadata | {"render_fps": round(1.0 / self.config.period)}
         self.observation_space, self.action_space = spaces(self.episodes)
         self._size = width, height
-        self._renderer: mujoco.Renderer | None = None
+        self._pictures: Pictures | None = None
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -75,21 +75,18 @@ class SandEnv(gym.Env[Observation, Action], EzPickle):
         )
 
     def render(self) -> NDArray[np.uint8] | None:
-        """A picture through the camera `follow`, (height, width, 3), or None without a render mode."""
+        """A picture by the camera `follow`, with the sand's forces, (height, width, 3); None without a render mode."""
         if self.render_mode is None:
             return None
-        if self._renderer is None:
-            width, height = self._size
-            self._renderer = mujoco.Renderer(self.model, height, width)
-        self._renderer.update_scene(self.data, camera="follow")
-        picture: NDArray[np.uint8] = self._renderer.render()
-        return picture
+        if self._pictures is None:
+            self._pictures = Pictures(self.model, *self._size)
+        return self._pictures.take(self.data, "follow")
 
     def close(self) -> None:
         """Let go of what pictures need."""
-        if self._renderer is not None:
-            self._renderer.close()
-            self._renderer = None
+        if self._pictures is not None:
+            self._pictures.close()
+            self._pictures = None
 
 
 def spaces(episodes: Episodes) -> tuple[Any, Any]:

@@ -4,43 +4,32 @@ import dataclasses
 from collections.abc import Callable
 from typing import Any
 
-import tyro
+import mujoco
+import numpy as np
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
 from rftsim.cli.output import print_json, print_line
-from rftsim.cli.settings import Settings, read_settings
+from rftsim.cli.scene import Scene
 from rftsim.errors import RftsimError
 from rftsim.model.add_sand import Bed
-from rftsim.model.geometry import Meshes
+from rftsim.model.poses import posed
+from rftsim.model.standing import Tree, standing
 from rftsim.run.advice import advise
-from rftsim.run.scenes import Staged, stage
 
 
 @dataclasses.dataclass(frozen=True)
-class Inspect:
+class Inspect(Scene):
     """Show how a scene would be modelled: bodies, triangles, law, sand, and why; and how much of it the scene needs.
 
     Example: rftsim inspect robot.xml --sand poppy-seeds --tolerance 0.01
     """
 
-    scene: tyro.conf.Positional[str]
-    """A shipped scene (grouser-wheel, half-grouser-wheel, four-flap-runner, intruder) or an MJCF file."""
-    law: str | None = None
-    """Law to take instead of the scene's."""
-    sand: str | None = None
-    """Sand to take instead of the scene's: a preset, key=value,... or a TOML file."""
-    set: Settings = ()
-    """Settings of a shipped scene, key=value ...; may be repeated."""
     tolerance: float = 0.01
     """Largest error of a body's wrench, from which follows how many elements it needs."""
     speed: float | None = None
     """Speed that decides on the law [m/s]; by default that of the fastest body at the start."""
-    keep_floor: bool = False
-    """Leave the floor as it is; by default the sand takes its place."""
-    meshes: Meshes | None = None
-    """How the meshes of model files are felt: as hulls by which MuJoCo collides with them, or as they are."""
     json: bool = False
     """Print JSON."""
 
@@ -48,9 +37,10 @@ class Inspect:
         """Stage the scene, whole and reduced, and print how it is modelled."""
         if self.speed is not None and not self.speed >= 0.0:
             raise RftsimError(f"the speed must be zero or more, not {self.speed:g} m/s")
-        whole, lean = self._stage(0.0), self._stage(self.tolerance)
+        whole, lean = self.staged(tolerance=0.0), self.staged(tolerance=self.tolerance)
         bed = whole.bed
         advice = advise(lean.model, lean.bed, self.speed)
+        stands = standing(whole.model, posed(whole.model, self.keyframe))
         bodies = {name: _body(bed, lean.bed, name) for name in bed.reasons}
         if self.json:
             print_json(
@@ -65,7 +55,9 @@ class Inspect:
                     "triangles": sum(surface.ntri for surface in bed.surfaces.values()),
                     "tolerance": self.tolerance,
                     "elements": sum(surface.ntri for surface in lean.bed.surfaces.values()),
+                    "stands": [_stand(whole.model, tree) for tree in stands.trees],
                     "advice": [one._asdict() for one in advice],
+                    "choices": bed.choices,
                     "warnings": warnings(),
                 }
             )
@@ -77,20 +69,11 @@ class Inspect:
         console.print(_table(bodies, self.tolerance))
         for name, row in bodies.items():
             print_line(console, f"{name}: {row['why']}")
+        for tree in stands.trees:
+            print_line(console, escape(_stand_line(whole.model, tree)))
         for one in advice:
             change = "keep" if one.law == bed.law.name else f"--law {one.law}, not"
             print_line(console, f"law: {change} {bed.law.name}: {one.reason}")
-
-    def _stage(self, tolerance: float) -> Staged:
-        return stage(
-            self.scene,
-            sand=self.sand,
-            law=self.law,
-            settings=read_settings(self.set),
-            tolerance=tolerance,
-            keep_floor=self.keep_floor,
-            meshes=self.meshes,
-        )
 
 
 def _body(whole: Bed, lean: Bed, name: str) -> dict[str, Any]:
@@ -106,6 +89,25 @@ def _body(whole: Bed, lean: Bed, name: str) -> dict[str, Any]:
         "error_held_back": economy.held_back if economy else None,
         "why": lean.reasons[name],
     }
+
+
+def _stand(model: mujoco.MjModel, tree: Tree) -> dict[str, Any]:
+    """Where a tree of bodies stands in the sand, as JSON has it."""
+    carried = np.isfinite(tree.lowered)
+    feet = {model.body(foot.body).name: {"sinkage_m": foot.sinkage, "share": foot.share} for foot in tree.feet}
+    lowered = tree.lowered if carried else None
+    return {"root": model.body(tree.root).name, "weight_N": tree.weight, "lowered_m": lowered, "feet": feet}
+
+
+def _stand_line(model: mujoco.MjModel, tree: Tree) -> str:
+    """A line that says where a tree of bodies stands in the sand."""
+    name = model.body(tree.root).name
+    if not np.isfinite(tree.lowered):
+        return f"stands: {name} does not, the sand carries its {tree.weight:.4g} N at no depth"
+    feet = ", ".join(
+        f"{model.body(foot.body).name} {1000 * foot.sinkage:.1f} mm ({100 * foot.share:.0f} %)" for foot in tree.feet
+    )
+    return f"stands: {name}, {tree.weight:.4g} N, lowered by {1000 * tree.lowered:.1f} mm: {feet}"
 
 
 def _table(bodies: dict[str, dict[str, Any]], tolerance: float) -> Table:

@@ -10,6 +10,7 @@ from rich.markup import escape
 
 from rftsim.cli.bench import Bench
 from rftsim.cli.demo import Demo
+from rftsim.cli.drop import Drop
 from rftsim.cli.evaluate import Evaluate
 from rftsim.cli.fit import Fit
 from rftsim.cli.force import Force
@@ -19,11 +20,14 @@ from rftsim.cli.play import Play
 from rftsim.cli.run import Run
 from rftsim.cli.train import Train
 from rftsim.cli.validate import Validate
-from rftsim.errors import RftsimError, RftsimWarning
+from rftsim.cli.view import View
+from rftsim.errors import RftsimError, RftsimNote, RftsimWarning
 
 Command = (
     Annotated[Force, tyro.conf.subcommand("force")]
     | Annotated[Run, tyro.conf.subcommand("run")]
+    | Annotated[Drop, tyro.conf.subcommand("drop")]
+    | Annotated[View, tyro.conf.subcommand("view")]
     | Annotated[Inspect, tyro.conf.subcommand("inspect")]
     | Annotated[Fit, tyro.conf.subcommand("fit")]
     | Annotated[Demo, tyro.conf.subcommand("demo")]
@@ -46,16 +50,19 @@ def main(arguments: list[str] | None = None) -> None:
         config=(tyro.conf.OmitArgPrefixes,),
     )
     with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always", RftsimWarning)
+        for kind in (RftsimNote, RftsimWarning):
+            warnings.simplefilter("always", kind)
         try:
-            command(lambda: texts_of(caught))
+            command(lambda: texts_of(caught, RftsimWarning))
         except (RftsimError, ValueError, OSError) as error:
             print_line(console, f"[red]error:[/red] {escape(str(error))}")
             sys.exit(2)
         finally:
-            print_doubts(console, texts_of(caught))
+            for note in texts_of(caught, RftsimNote):
+                print_line(console, f"[cyan]note:[/cyan] {escape(note)}")
+            print_doubts(console, texts_of(caught, RftsimWarning))
 
 
-def texts_of(caught: list[warnings.WarningMessage]) -> list[str]:
-    """The texts of the distinct warnings, in the order in which they came."""
-    return list(dict.fromkeys(str(warning.message) for warning in caught))
+def texts_of(caught: list[warnings.WarningMessage], kind: type[Warning]) -> list[str]:
+    """The texts of the distinct warnings of a kind, in the order in which they came."""
+    return list(dict.fromkeys(str(warning.message) for warning in caught if issubclass(warning.category, kind)))

@@ -15,6 +15,7 @@ from rftsim.cli.output import make_table, print_json, print_written
 from rftsim.cli.settings import Settings, read_settings
 from rftsim.errors import RftsimError
 from rftsim.files import check_writable, replacing
+from rftsim.view.render import SIZE
 
 if TYPE_CHECKING:
     from rftsim_envs.env import SandEnv
@@ -69,7 +70,7 @@ class Play:
             raise RftsimError(f"{self.run} is no folder of `rftsim train`: it has no policy")
         with contextlib.ExitStack() as stack:
             given = plan.settings | read_settings(self.set)
-            env = SandEnv(plan.task, "rgb_array" if self.video else None, *play.SIZE, **given)
+            env = SandEnv(plan.task, "rgb_array" if self.video else None, *SIZE, **given)
             stack.callback(env.close)
             watchers = self._watchers(env, stack)
 

@@ -8,37 +8,29 @@ from pathlib import Path
 from typing import Any, Literal
 
 import mujoco
-import tyro
 from rich.console import Console
 from rich.progress import Progress
 
 from rftsim.cli.output import print_doubts, print_json, print_written
 from rftsim.cli.results import draw
-from rftsim.cli.settings import Settings, read_settings
+from rftsim.cli.scene import Scene, print_robot, robot_report
 from rftsim.files import check_writable
-from rftsim.model.geometry import Meshes
 from rftsim.run.run import SAMPLES, run
 from rftsim.run.run import Run as Finished
-from rftsim.run.scenes import Staged, stage
+from rftsim.run.scenes import Staged
 from rftsim.view.history import plot_history
-from rftsim.view.render import save_picture
+from rftsim.view.render import Pictures, save_picture
 
 
 @dataclasses.dataclass(frozen=True)
-class Run:
+class Run(Scene):
     """Run a scene on sand and report its steady state: means over the last 40 %.
+
+    Of a model file also, at the end: the trunk's height, each foot's sinkage, and what the sand carries of the weight.
 
     Example: rftsim run grouser-wheel --set rpm=60 --plot wheel.png --record wheel.rrd
     """
 
-    scene: tyro.conf.Positional[str]
-    """A shipped scene (grouser-wheel, half-grouser-wheel, four-flap-runner, intruder) or an MJCF file."""
-    law: str | None = None
-    """Law to take instead of the scene's."""
-    sand: str | None = None
-    """Sand to take instead of the scene's: a preset, key=value,... or a TOML file."""
-    set: Settings = ()
-    """Settings of a shipped scene, key=value ...; may be repeated."""
     force: Literal["implicit", "explicit"] = "implicit"
     """The sand's force: at the end of each step, or at the velocity of the moment, which needs short steps."""
     tolerance: float | None = None
@@ -52,11 +44,9 @@ class Run:
     plot: Path | None = None
     """Draw the run, .png, .pdf or .svg."""
     picture: Path | None = None
-    """Render the last moment with the sand's traction as arrows, .png."""
-    keep_floor: bool = False
-    """Leave the floor as it is; by default the sand takes its place."""
-    meshes: Meshes | None = None
-    """How the meshes of model files are felt: as hulls by which MuJoCo collides with them, or as they are."""
+    """Render the last moment with the sand's forces and tractions as arrows, .png."""
+    settle: bool = True
+    """Start a model file where it stands: what floats is lowered or raised until the sand carries it."""
     json: bool = False
     """Print JSON."""
 
@@ -69,9 +59,11 @@ class Run:
         if self.picture:
             check_writable(self.picture, ".png")
         staged = self._stage()
-        finished = self._simulate(staged)
-        draw(self.plot, plot_history, finished.history, f"{self.scene}, {staged.bed.law.name}")
-        draw(self.picture, save_picture, staged.model, finished.last, staged.measured.body)
+        with contextlib.ExitStack() as stack:
+            pictures = stack.enter_context(Pictures(staged.model)) if self.picture else None  # fails now, or not at all
+            finished = self._simulate(staged)
+            draw(self.plot, plot_history, finished.history, f"{self.scene}, {staged.bed.law.name}")
+            draw(self.picture, save_picture, pictures, finished.last)
         if self.json:
             print_json(self._report(staged, finished, warnings()))
             return
@@ -80,22 +72,19 @@ class Run:
         law = staged.bed.law.name
         console.print(f"[bold]{self.scene}[/bold], law {law}, {staged.duration:g} s", highlight=False)
         console.print(f"speed {steady.speed:.4g} m/s, sinkage {steady.sinkage:.4g} m{slip}")
+        if finished.robot is not None:
+            print_robot(console, finished.robot)
         console.print(f"{finished.realtime_factor:.3g} times real time")
         print_doubts(console, finished.doubts)
         print_written(console, self.plot, self.picture, self.record)
 
     def _stage(self) -> Staged:
-        return stage(
-            self.scene,
-            sand=self.sand,
-            law=self.law,
-            settings=read_settings(self.set),
+        return self.staged(
+            settle=self.settle,
             timestep=self.timestep,
             duration=self.duration,
             force=self.force,
             tolerance=self.tolerance,
-            keep_floor=self.keep_floor,
-            meshes=self.meshes,
         )
 
     def _report(self, staged: Staged, finished: Finished, warnings: list[str]) -> dict[str, Any]:
@@ -110,7 +99,9 @@ class Run:
             "sinkage_m": steady.sinkage,
             "slip": steady.slip,
             "rate_rad_s": steady.rate,
+            **(robot_report(finished.robot) if finished.robot is not None else {}),
             "realtime_factor": finished.realtime_factor,
+            "choices": staged.bed.choices,
             "warnings": [*warnings, *finished.doubts],
         }
 

@@ -8,6 +8,7 @@ import numpy as np
 from rftsim.engine.block import BODY_MARKER, SAND_MARKER, read_block
 from rftsim.errors import SceneError
 from rftsim.law import evaluate, layout
+from rftsim.model.write import DRAWING_MARKER
 from rftsim.surface.triangles import Array
 
 
@@ -79,6 +80,18 @@ def instances(model: mujoco.MjModel) -> list[Instance]:
         start = int(model.numeric_adr[numeric])
         beds.append(Instance(instance, name, start, _numeric(model, numeric), bodies))
     return beds
+
+
+def sand_planes(model: mujoco.MjModel) -> list[int]:
+    """Ids of the geoms that draw the surfaces of a model's beds."""
+    names = {bed.name for bed in instances(model)}
+    return [geom for geom in range(model.ngeom) if _drawn_bed(model.geom(geom).name) in names]
+
+
+def _drawn_bed(geom: str) -> str | None:
+    """The name of the bed that a geom of this name draws, if any; what a model was attached under may stand around."""
+    before, marker, after = geom.rpartition(DRAWING_MARKER)
+    return before + after if marker else None
 
 
 def _marked(by_name: dict[str, int], marker: str, owner: str) -> int | None:

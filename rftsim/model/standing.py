@@ -49,6 +49,8 @@ class Tree(NamedTuple):
     does not carry them at any depth, and nothing was moved."""
     feet: tuple[Foot, ...]
     """The bodies in the sand, by their share of the weight, the largest first."""
+    rise: Array
+    """Change of the joints' positions for each metre up along the normal, shape (nq,)."""
 
 
 class Standing(NamedTuple):
@@ -58,6 +60,12 @@ class Standing(NamedTuple):
     """Positions of the joints, shape (nq,)."""
     trees: tuple[Tree, ...]
     """Those that can move along the sand's normal, have weight, and have a body that feels the sand."""
+
+    def raised(self, share: float) -> Array:
+        """Positions with each tree higher by a share of its largest sinkage, shape (nq,)."""
+        heights = [share * max((foot.sinkage for foot in tree.feet), default=0.0) for tree in self.trees]
+        up = [height * tree.rise for height, tree in zip(heights, self.trees, strict=True)]
+        return self.qpos + np.sum(up, axis=0) if up else self.qpos.copy()
 
 
 class _Mover(NamedTuple):
@@ -113,9 +121,11 @@ def stand(model: mujoco.MjModel, data: mujoco.MjData, bed: Array, surfaces: Mapp
         weight = _weight(model, bodies, up)
         if not felt or not weight > 0.0:
             continue
-        tree = _stand_tree(posed, bed, felt, Tree(int(bodies.min()), bodies, weight, 0.0, ()))
-        for mover in group if np.isfinite(tree.lowered) else ():
-            qpos[mover.places] -= tree.lowered * mover.rates
+        rise = np.zeros(model.nq)
+        for mover in group:
+            rise[mover.places] += mover.rates
+        tree = _stand_tree(posed, bed, felt, Tree(int(bodies.min()), bodies, weight, 0.0, (), rise))
+        qpos -= (tree.lowered if np.isfinite(tree.lowered) else 0.0) * rise
         trees.append(tree)
     return Standing(qpos, tuple(trees))
 
@@ -140,6 +150,12 @@ def sinkage(bed: Array, surface: Array, xpos: Array, xmat: Array) -> float:
     tilt = np.sqrt(np.maximum(1.0 - (up @ np.array(columns[3:])) ** 2, 0.0))
     corners = (REACH * np.sqrt(area) * tilt - up @ np.array(columns[:3])).max()
     return below + float(min(box, corners))
+
+
+def moving_weight(model: mujoco.MjModel) -> float:
+    """The weight of everything that can move, less what MuJoCo compensates [N]."""
+    own = model.body_mass * (1.0 - model.body_gravcomp)
+    return float(own[model.body_weldid != 0].sum() * np.linalg.norm(model.opt.gravity))
 
 
 def _stand_tree(posed: mujoco.MjData, bed: Array, felt: Mapping[int, Array], tree: Tree) -> Tree:

@@ -1,21 +1,16 @@
-"""The start of a model: the pose of its first keyframe, or the reference pose, and what of it stands free there."""
+"""The start of a model before it has sand: its pose, and which of its trees something has to carry."""
 
 import mujoco
 import numpy as np
 
+from rftsim.model.poses import posed
+
 _JOINT = mujoco.mjtJoint
 
 
-def start(model: mujoco.MjModel, keyframe: int | None = None) -> mujoco.MjData:
-    """Data at a keyframe, by default the first, or at the reference pose where there is none; with its kinematics.
-
-    Args:
-        model: Compiled.
-        keyframe: Number of the keyframe.
-    """
-    data = mujoco.MjData(model)
-    if model.nkey:
-        mujoco.mj_resetDataKeyframe(model, data, keyframe or 0)
+def start(model: mujoco.MjModel) -> mujoco.MjData:
+    """Data in the pose in which a compiled model starts, see `posed`, with its kinematics and centres of mass."""
+    data = posed(model)
     mujoco.mj_kinematics(model, data)
     mujoco.mj_comPos(model, data)
     return data

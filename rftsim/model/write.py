@@ -12,10 +12,18 @@ from rftsim.law import layout
 from rftsim.sand.free_surface import FreeSurface
 from rftsim.surface.triangles import Array, Surface
 
-SAND_RGBA: Final = (1.0, 1.0, 1.0, 0.6)
+SAND_RGBA: Final = (1.0, 1.0, 1.0, 0.75)
 """Colour by which the texture of the drawn sand is multiplied, and its opacity."""
-GRAIN_RGB: Final = ((0.78, 0.72, 0.52), (0.66, 0.59, 0.41))
+GRAIN_RGB: Final = ((0.60, 0.52, 0.39), (0.45, 0.385, 0.285))
 """Colours of the drawn sand and of the grains on it."""
+GRAIN_SIZE: Final = 0.001
+"""Side of a pixel of the drawn sand [m]."""
+PIXELS: Final = 256
+"""Side of its texture, which repeats [pixels]."""
+SHINE: Final = 0.2
+"""Light that the drawn sand gives off itself."""
+DRAWING_MARKER: Final = "_surface"
+"""End of the name of the geom, texture and material that draw a bed; its name stands before."""
 
 
 class Carrier(NamedTuple):
@@ -88,7 +96,11 @@ def write_sensors(spec: mujoco.MjSpec, carrier: Carrier, bodies: Iterable[str]) 
 
 
 def write_drawing(spec: mujoco.MjSpec, name: str, terrain: FreeSurface) -> None:
-    """Draw the surface of a bed of sand as a translucent plane of grains, which collides with nothing."""
+    """Draw the surface of a bed of sand as a plane of grains, which collides with nothing and lets what is buried show.
+
+    The grains are noise, which far away becomes an even colour; they shine a little, so that sand looks like sand
+    under a model's own lights, whatever these are.
+    """
     normal, drawing = terrain.normal, _drawing(name)
     half = 0.5 * math.acos(min(normal[2], 1.0))
     length = math.hypot(normal[0], normal[1]) or 1.0
@@ -98,13 +110,16 @@ def write_drawing(spec: mujoco.MjSpec, name: str, terrain: FreeSurface) -> None:
         type=mujoco.mjtTexture.mjTEXTURE_2D,
         builtin=mujoco.mjtBuiltin.mjBUILTIN_FLAT,
         mark=mujoco.mjtMark.mjMARK_RANDOM,
-        random=0.15,
+        random=0.35,
         rgb1=GRAIN_RGB[0],
         markrgb=GRAIN_RGB[1],
-        width=64,
-        height=64,
+        width=PIXELS,
+        height=PIXELS,
     )
-    grains = spec.add_material(name=drawing, texrepeat=[4, 4], texuniform=True)
+    repeat = 1.0 / (PIXELS * GRAIN_SIZE)
+    grains = spec.add_material(
+        name=drawing, texrepeat=[repeat, repeat], texuniform=True, emission=SHINE, specular=0.0, shininess=0.0
+    )
     grains.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = drawing
     spec.worldbody.add_geom(
         name=drawing,
@@ -124,7 +139,7 @@ def _sensor(body: str) -> str:
 
 
 def _drawing(bed: str) -> str:
-    return f"{bed}_surface"
+    return bed + DRAWING_MARKER
 
 
 def _attach(plugin: Any, carrier: Carrier) -> None:

@@ -1,5 +1,6 @@
 """Running a staged scene: steps, what is measured on the way, and the steady state."""
 
+import math
 import time
 from collections.abc import Callable, Generator
 from typing import Any, NamedTuple
@@ -9,7 +10,9 @@ import numpy as np
 
 from rftsim.errors import RftsimError
 from rftsim.model.readout import work, wrenches
+from rftsim.run.robot import Robot, measure, sinkages, total_force
 from rftsim.run.scenes import Staged
+from rftsim.run.start import begin
 from rftsim.run.validity import Validity, validity
 from rftsim.surface.triangles import Array
 
@@ -26,14 +29,14 @@ class History(NamedTuple):
     time: Array
     """Simulated time [s]."""
     speed: Array
-    """Horizontal speed of the measured body, along x [m/s]."""
+    """Horizontal speed of the measured body [m/s]: along x, or in any direction for a robot's trunk."""
     sinkage: Array
-    """Sinkage of the measured body [m]: outer radius less axle height for a wheel, otherwise depth of the deepest
-    corner."""
+    """Sinkage [m]: outer radius less axle height for a wheel, depth of the deepest corner of any body for a robot, and
+    of the measured body otherwise."""
     rate: Array
     """Angular velocity of the measured body about y [rad/s]."""
     force: Array
-    """Force of the sand on the measured body [N], shape (n, 3)."""
+    """Force of the sand on the measured body, or on all of a robot's [N], shape (n, 3)."""
     power: Array
     """Power of the sand on all bodies [W]."""
 
@@ -42,9 +45,9 @@ class Steady(NamedTuple):
     """The means over the last 40 % of a run, its steady state."""
 
     speed: float
-    """Horizontal speed of the measured body, along x [m/s]."""
+    """Horizontal speed of the measured body [m/s], see `History`."""
     sinkage: float
-    """Sinkage of the measured body [m], see `History`."""
+    """Sinkage [m], see `History`."""
     slip: float | None
     """1 - v / (R omega) of a wheel; None elsewhere, or where it does not turn."""
     rate: float
@@ -64,6 +67,8 @@ class Run(NamedTuple):
     """Where the run left the theory's range, with numbers."""
     last: mujoco.MjData
     """MuJoCo's data at the end."""
+    robot: Robot | None
+    """A robot's measures at the end, what the sand carries as a mean over the steady state; None of other scenes."""
 
 
 class RunError(RftsimError):
@@ -71,7 +76,7 @@ class RunError(RftsimError):
 
 
 def run(staged: Staged, observe: Callable[[mujoco.MjData], Any] | None = None) -> Run:
-    """Run a staged scene from its first keyframe, or from its initial state.
+    """Run a staged scene from its start.
 
     Args:
         staged: The scene.
@@ -94,10 +99,7 @@ def run(staged: Staged, observe: Callable[[mujoco.MjData], Any] | None = None) -
 def steps(staged: Staged) -> Generator[mujoco.MjData, None, Run]:
     """The run of a staged scene as an iterator over the data at its samples, whose return value is the `Run`."""
     model = staged.model
-    data = mujoco.MjData(model)
-    if model.nkey:
-        mujoco.mj_resetDataKeyframe(model, data, 0)
-    mujoco.mj_forward(model, data)
+    data = begin(staged)
     total = max(round(staged.duration / model.opt.timestep), 1)
     every = max(total // SAMPLES, 1)
     rows: list[tuple[Any, ...]] = []
@@ -107,7 +109,7 @@ def steps(staged: Staged) -> Generator[mujoco.MjData, None, Run]:
         started = time.perf_counter()
         mujoco.mj_step(model, data, nstep=min(every, total - first))
         elapsed += time.perf_counter() - started
-        _refuse_warnings(data)
+        refuse_warnings(data)
         rows.append(_row(staged, data))
         if (first // every) % max(SAMPLES // _CHECKS, 1) == 0:
             checks += validity(model, data, staged.bed.sand.grain_diameter)
@@ -115,7 +117,8 @@ def steps(staged: Staged) -> Generator[mujoco.MjData, None, Run]:
     columns = [np.array(column) for column in zip(*rows, strict=True)]
     history = History(*columns)
     doubts = tuple(dict.fromkeys([*_worst(checks), *_unsolved(model, data)]))
-    return Run(history, _steady(history, staged.measured.wheel_radius), staged.duration / elapsed, doubts, data)
+    steady = _steady(history, staged.measured.wheel_radius)
+    return Run(history, steady, staged.duration / elapsed, doubts, data, _robot(staged, data, history))
 
 
 def _row(staged: Staged, data: mujoco.MjData) -> tuple[Any, ...]:
@@ -125,6 +128,10 @@ def _row(staged: Staged, data: mujoco.MjData) -> tuple[Any, ...]:
     wrench = wrenches(model, data)
     velocity = np.empty(6)
     mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_XBODY, body, velocity, 0)
+    if measured.robot:
+        deepest = next(iter(sinkages(model, data).values()))
+        speed = math.hypot(velocity[3], velocity[4])
+        return data.time, speed, deepest, velocity[1], total_force(model, data), float(wrench.power.sum())
     below = measured.wheel_radius
     if below is None:
         corners = staged.bed.surfaces[measured.body].corners
@@ -133,14 +140,32 @@ def _row(staged: Staged, data: mujoco.MjData) -> tuple[Any, ...]:
     return data.time, velocity[3], sinkage, velocity[1], wrench.force[body].copy(), float(wrench.power.sum())
 
 
+def _robot(staged: Staged, data: mujoco.MjData, history: History) -> Robot | None:
+    """The measures of a robot at the end of its run."""
+    if not staged.measured.robot:
+        return None
+    lift = float(history.force[_last(history)].mean(axis=0) @ np.asarray(staged.bed.terrain.normal))
+    return measure(staged.model, data, staged.measured.body, lift)
+
+
+def _last(history: History) -> slice:
+    """The samples of the steady state."""
+    return slice(int(len(history.time) * (1 - STEADY)), None)
+
+
 def _steady(history: History, radius: float | None) -> Steady:
-    last = slice(int(len(history.time) * (1 - STEADY)), None)
+    last = _last(history)
     speed, sinkage, rate = (float(np.mean(x[last])) for x in (history.speed, history.sinkage, history.rate))
     slip = None if radius is None or rate == 0.0 else 1.0 - speed / (radius * rate)
     return Steady(speed, sinkage, slip, rate)
 
 
-def _refuse_warnings(data: mujoco.MjData) -> None:
+def refuse_warnings(data: mujoco.MjData) -> None:
+    """Refuse the data of a simulation that diverged.
+
+    Raises:
+        RunError: It did; MuJoCo has reset it.
+    """
     for kind in ("mjWARN_BADQPOS", "mjWARN_BADQVEL", "mjWARN_BADQACC", "mjWARN_BADCTRL"):
         if data.warning[getattr(mujoco.mjtWarning, kind)].number:
             raise RunError(

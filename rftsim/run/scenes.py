@@ -10,6 +10,7 @@ from rftsim_models import intruder, wheels
 
 from rftsim.errors import SceneError
 from rftsim.model.add_sand import WHOLE, Bed, add_sand, read_spec
+from rftsim.run.robot import trunk
 from rftsim.sand.medium import Sand
 from rftsim.sand.presets import PRESETS
 from rftsim.surface.triangles import Wheel, load_surface
@@ -25,6 +26,8 @@ class Measured(NamedTuple):
     """The body whose speed and sinkage are meant."""
     wheel_radius: float | None
     """Outer radius where the body is a wheel about y [m]: its sinkage is then radius less axle height, and it slips."""
+    robot: bool = False
+    """Whether the body is the trunk of a robot: the sinkage is then that of its deepest body, the force that on all."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -49,6 +52,15 @@ class Scene:
     """Whether the free surface drops behind the wheel under the dynamic laws."""
 
 
+class Start(NamedTuple):
+    """The state in which a scene starts."""
+
+    keyframe: str | None = None
+    """Name or number of the keyframe; by default the first, or the initial state where there is none."""
+    settle: bool = False
+    """Whether what floats is lowered or raised until the sand carries it."""
+
+
 class Staged(NamedTuple):
     """A scene with its sand, compiled and ready to run."""
 
@@ -60,6 +72,8 @@ class Staged(NamedTuple):
     """The body that it is measured by."""
     duration: float
     """How long it runs [s]."""
+    start: Start = Start()
+    """How it starts."""
 
 
 def _grouser_wheel(settings: Settings) -> wheels.WheelParameters:
@@ -100,6 +114,8 @@ POPPY: Final = PRESETS["poppy-seeds"]
 """The sand of the shipped scenes, and of model files where no other is asked for."""
 FILE_LAW: Final = "rft3d"
 """The law of model files where no other is asked for."""
+FILE_START: Final = Start(settle=True)
+"""The start of model files where nothing else is asked for."""
 FILE_DURATION: Final = 4.0
 """How long model files run where nothing else is asked for [s]."""
 
@@ -150,6 +166,7 @@ def stage(
     settings: Mapping[str, str] | None = None,
     timestep: float | None = None,
     duration: float | None = None,
+    start: Start = FILE_START,
     **options: Any,
 ) -> Staged:
     """A shipped scene, or somebody's MJCF, with its sand, compiled.
@@ -161,6 +178,7 @@ def stage(
         settings: Changes of the scene's settings.
         timestep: Time step instead of the model's [s].
         duration: Duration instead of the scene's [s].
+        start: How a model file starts; shipped scenes have a start of their own.
         **options: Further options of `add_sand`; None stands for its own choice, or the scene's.
 
     Raises:
@@ -183,13 +201,15 @@ def stage(
     if sand is None:
         sand = scene.sand if scene else POPPY
     bed = add_sand(spec, sand, law or (scene.law if scene else FILE_LAW), **_given(options))
+    model = spec.compile()
     if scene is None:
-        measured = Measured(next(iter(bed.surfaces)), None)
+        measured = Measured(trunk(model, [model.body(name).id for name in bed.surfaces]), None, robot=True)
     elif wheel is None:
         measured = Measured(intruder.INTRUDER, None)
     else:
         measured = Measured(wheels.WHEEL, wheel.outer_radius)
-    return Staged(spec.compile(), bed, measured, duration or (scene.duration if scene else FILE_DURATION))
+    duration = duration or (scene.duration if scene else FILE_DURATION)
+    return Staged(model, bed, measured, duration, Start() if scene else start)
 
 
 def _given(options: Mapping[str, Any]) -> dict[str, Any]:

@@ -88,7 +88,7 @@ def _changing(portrait: Portrait, frames: Frame, force_scale: float, traction_sc
         for quantity, values in ("force", frames.force), ("moment", frames.moment), ("depth", frames.depth):
             yield _entity("sand", quantity, name), rr.Scalars, {"scalars": values[:, i]}
         arrow = {
-            "origins": frames.position[:, skin.body],
+            "origins": frames.start[:, i],
             "vectors": frames.force[:, i] * (portrait.extent / force_scale),
         }
         yield _entity("world", "force", name), rr.Arrows3D, arrow
@@ -99,8 +99,9 @@ def _changing(portrait: Portrait, frames: Frame, force_scale: float, traction_sc
 def _fixed(portrait: Portrait, force_scale: float, traction_scale: float) -> Iterator[tuple[str, rr.AsComponents]]:
     """The entities that stay as they are, each with its shape, text or style."""
     about = (
-        f"**Arrows**: the sand's force, {portrait.extent:.3g} m long for {force_scale:.3g} N. **Colours**: traction, "
-        f"darkest from {traction_scale:.3g} Pa on; grey where the sand does not act. **Grid**: {portrait.cell:g} m."
+        f"**Arrows**, from the surface above where it acts: the sand's force, {portrait.extent:.3g} m long for "
+        f"{force_scale:.3g} N. **Colours**: traction, darkest from {traction_scale:.3g} Pa on; grey where sand does "
+        f"not act. **Grid**: {portrait.cell:g} m."
     )
     yield "/about", rr.TextDocument(about, media_type="text/markdown")
     yield "/world", rr.ViewCoordinates.RIGHT_HAND_Z_UP

@@ -11,7 +11,10 @@ from scipy.spatial import cKDTree
 from rftsim.model.geometry import MESHES, bounding_geoms
 from rftsim.model.readout import Instance, body_velocities, instances, tractions, wrenches
 from rftsim.model.shaping import Fineness, body_surface
+from rftsim.model.standing import moving_weight
 from rftsim.surface.triangles import Array
+from rftsim.view.bounds import bounds
+from rftsim.view.forces import resultants
 
 
 class Plane(NamedTuple):
@@ -90,6 +93,8 @@ class Frame(NamedTuple):
     """The sand's force on each body that feels it [N], shape (nfelt, 3)."""
     moment: Array
     """The sand's moment about each such body's origin [N m], shape (nfelt, 3)."""
+    start: Array
+    """Point of the free surface above where each such force acts [m], shape (nfelt, 3), see `Resultant`."""
     depth: Array
     """Depth of each such body's deepest triangle [m], shape (nfelt,)."""
     power: Any
@@ -105,8 +110,8 @@ def describe(model: mujoco.MjModel) -> Portrait:
     beds = instances(model)
     skins = [_make_skin(model, start, body) for bed in beds for body in bed.bodies]
     roots = np.unique(model.body_rootid[[skin.body for skin in skins] or slice(1, None)]).tolist()
-    weight = float(model.body_mass[model.body_weldid != 0].sum() * np.linalg.norm(model.opt.gravity))
-    return Portrait(model, [(bed, _make_plane(bed.bed)) for bed in beds], skins, roots, weight, *_bounds(model, start))
+    planes = [(bed, _make_plane(bed.bed)) for bed in beds]
+    return Portrait(model, planes, skins, roots, moving_weight(model), *bounds(model, start))
 
 
 def _make_skin(model: mujoco.MjModel, start: mujoco.MjData, body: int) -> Skin:
@@ -132,16 +137,6 @@ def _make_plane(bed: Any) -> Plane:
     return Plane(along, np.cross(up, along), up, float(bed.offset))
 
 
-def _bounds(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[Array, float]:
-    """Centre and longest side of a box around the geoms that can move, or MuJoCo's where none can [m]."""
-    geoms = (model.body_weldid[model.geom_bodyid] != 0) & (model.geom_rbound > 0.0)
-    if not geoms.any():
-        return model.stat.center.copy(), float(model.stat.extent)
-    radii = model.geom_rbound[geoms, None]
-    low, high = (data.geom_xpos[geoms] - radii).min(axis=0), (data.geom_xpos[geoms] + radii).max(axis=0)
-    return 0.5 * (low + high), float((high - low).max())
-
-
 def _round_down(x: float) -> float:
     """The largest of 1, 2, 5 times a power of ten that does not exceed x."""
     power = 10.0 ** math.floor(math.log10(x))
@@ -163,6 +158,7 @@ def sample(portrait: Portrait, data: mujoco.MjData, time: float) -> Frame:
         speed=np.linalg.norm(body_velocities(portrait.model, data)[0][portrait.roots], axis=1),
         force=sand.force[felt],
         moment=sand.moment[felt],
+        start=np.array([one.start for one in resultants(portrait.model, data)]).reshape(-1, 3),
         depth=np.array([one.depth.max() for one in found]),
         power=sand.power.sum(),
         traction=np.concatenate([np.empty(0), *strengths], dtype=np.float32),

@@ -20,10 +20,11 @@ class Recorder:
     """Records one MuJoCo simulation for the Rerun viewer.
 
     Under `world`: the geoms (not planes and height fields, which have no end), the surfaces that feel the sand coloured
-    by traction, an arrow of the sand's force from each body's origin, and the sand's surface, which follows the bodies
-    in whole cells of its grid. Under `sand`: force [N], moment about the body's origin [N m] and depth of the deepest
-    triangle [m] of each body, and the total power [W]. Under `speed`: that of each root body [m/s]. All are those of
-    the last mj_forward or mj_step of the data. `about` states the scales, which are those of the whole recording.
+    by traction, an arrow of the sand's force on each body from the surface above where it acts, and the sand's surface,
+    which follows the bodies in whole cells of its grid. Under `sand`: force [N], moment about the body's origin [N m]
+    and depth of the deepest triangle [m] of each body, and the total power [W]. Under `speed`: that of each root body
+    [m/s]. All are those of the last mj_forward or mj_step of the data. `about` states the scales, which are those of
+    the whole recording.
 
     Frames stay in memory, some 4 bytes per triangle each, until `close` writes the file. An exception inside the
     with-block does so too: the frames before it show what went wrong. When a reset turns time back, the recording goes

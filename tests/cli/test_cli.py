@@ -215,7 +215,7 @@ def test_bad_xml_is_an_error_not_a_trace(capsys, tmp_path):
     assert "error:" in err
 
 
-@pytest.mark.parametrize("command", ["force", "run", "inspect", "demo"])
+@pytest.mark.parametrize("command", ["force", "run", "inspect", "demo", "drop", "view"])
 def test_help_has_an_example(capsys, command):
     code, out, _ = call(capsys, command, "--help")
     assert code == 0

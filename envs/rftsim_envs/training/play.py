@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib import image
 from numpy.typing import NDArray
 
-from rftsim.view.render import render
+from rftsim.view.render import SIZE, Pictures
 from rftsim_envs.env import SandEnv
 from rftsim_envs.recipe import TrainingError
 from rftsim_envs.tally import Tally
@@ -18,12 +18,8 @@ from rftsim_envs.training.actors import Maker
 
 FPS: Final = 30.0
 """Pictures per second of a film."""
-SIZE: Final = (960, 540)
-"""Width and height of films [pixels]."""
 MOMENTS: Final = 4
 """Number of pictures in a strip."""
-ARROW: Final = 0.3
-"""Length of the strongest traction's arrow in a strip, over the model's extent."""
 
 
 def play(
@@ -63,7 +59,7 @@ def play(
 def taking_strip(env: SandEnv, path: Path) -> Iterator[Callable[[Mapping[str, Any]], None]]:
     """Take a picture of `MOMENTS` moments, evenly spaced, on sand: call what is given after each control step.
 
-    Arrows are the sand's traction.
+    Arrows are the sand's forces and tractions.
     """
     states: list[NDArray[np.float64]] = []
     kept, model, camera = mujoco.mjtState.mjSTATE_INTEGRATION, env.model, "follow"
@@ -75,12 +71,11 @@ def taking_strip(env: SandEnv, path: Path) -> Iterator[Callable[[Mapping[str, An
 
     yield watch
     data, pictures = mujoco.MjData(model), []
-    for k in np.linspace(0, len(states) - 1, MOMENTS).round().astype(int):
-        mujoco.mj_setState(model, data, states[k], kept)
-        mujoco.mj_forward(model, data)
-        width, height = SIZE
-        length = ARROW * float(model.stat.extent)
-        pictures.append(render(model, data, camera=camera, width=width // 2, height=height, arrows=length))
+    with Pictures(model, SIZE[0] // 2, SIZE[1]) as taker:
+        for k in np.linspace(0, len(states) - 1, MOMENTS).round().astype(int):
+            mujoco.mj_setState(model, data, states[k], kept)
+            mujoco.mj_forward(model, data)
+            pictures.append(taker.take(data, camera))
     image.imsave(path, np.hstack(pictures))
 
 

@@ -1,0 +1,129 @@
+"""What is drawn of the sand's forces, and pictures of any size in which what is buried shows."""
+
+import mujoco
+import numpy as np
+import pytest
+
+import rftsim
+from rftsim.model.readout import sand_planes
+from rftsim.model.standing import standing
+from rftsim.view import drawing, render
+from rftsim.view.bounds import bounds, corners
+from rftsim.view.forces import resultants
+
+SCENE = """
+<mujoco><worldbody>
+  <geom name="floor" type="plane" size="1 1 1" rgba="0 0 0 0"/>
+  <body name="box" pos="0 0 .1"><freejoint/><geom type="box" size=".1 .05 .04" mass="12" rgba="1 0 0 1"/></body>
+  <body name="ball" pos=".4 0 .1"><freejoint/><geom size=".05" mass="2" rgba="0 0 1 1"/></body>
+</worldbody></mujoco>"""
+
+
+@pytest.fixture(scope="module")
+def rest():
+    """A box and a ball that have come to rest in sand."""
+    model = rftsim.load(SCENE)
+    data = mujoco.MjData(model)
+    data.qpos[:] = standing(model, data).qpos
+    mujoco.mj_step(model, data, nstep=200)
+    return model, data
+
+
+def drawn(model, data, **shown):
+    scene = mujoco.MjvScene(model, maxgeom=5000)
+    drawing.Drawing(model).draw(scene, data, drawing.Shown(**shown))
+    return [scene.geoms[i] for i in range(scene.ngeom)]
+
+
+def of_type(geoms, kind):
+    return [geom for geom in geoms if geom.type == kind]
+
+
+def test_a_force_is_an_arrow_from_the_surface_as_long_as_its_share_of_the_weight(rest):
+    model, data = rest
+    geoms = drawn(model, data, tractions=False)
+    found = of_type(geoms, mujoco.mjtGeom.mjGEOM_ARROW)
+    extent = bounds(model, data)[1]
+    assert len(found) == 2
+    for arrow, place, mass in zip(found, ((0, 0), (0.4, 0)), (12, 2), strict=True):
+        assert arrow.pos == pytest.approx((*place, 0), abs=2e-3)
+        assert arrow.mat[:, 2] == pytest.approx((0, 0, 1), abs=0.02)
+        assert arrow.size[2] / 2 == pytest.approx(drawing.WEIGHT_LENGTH * extent * mass / 14, rel=0.02)
+    assert [geom.label for geom in geoms if geom.label] == ["118 N", "19.6 N"]
+
+
+def test_tractions_end_on_the_triangles_that_they_press(rest):
+    model, data = rest
+    found = of_type(drawn(model, data, forces=False), mujoco.mjtGeom.mjGEOM_LINE)
+    pressed = [rftsim.tractions(model, data, name) for name in ("box", "ball")]
+    centres = np.concatenate([one.centre[one.active] for one in pressed])
+    tips = np.array([line.pos + line.mat[:, 2] * line.size[2] for line in found])
+    assert 0 < len(tips) <= len(centres)
+    assert np.linalg.norm(tips[:, None] - centres, axis=2).min(axis=1).max() < 1e-6
+
+
+def test_of_many_triangles_some_have_a_line(rest, monkeypatch):
+    monkeypatch.setattr(drawing, "MOST", 20)
+    assert 10 < len(of_type(drawn(*rest, forces=False), mujoco.mjtGeom.mjGEOM_LINE)) <= 20
+
+
+def test_a_full_scene_takes_no_more(rest):
+    scene = mujoco.MjvScene(rest[0], maxgeom=3)
+    drawing.Drawing(rest[0]).draw(scene, rest[1])
+    assert scene.ngeom == 3
+
+
+def test_nothing_is_drawn_in_the_air():
+    model = rftsim.load(SCENE.replace('pos="0 0 .1"', 'pos="0 0 1"'))
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    assert drawn(model, data) == []
+    assert all((one.force == 0.0).all() for one in resultants(model, data))
+
+
+def test_a_force_at_an_offset_starts_above_where_it_acts():
+    """A body with its foot far from its origin: the arrow starts above the foot."""
+    foot = '<body name="leg" pos="0 0 0"><freejoint/><geom size=".05" pos=".3 .2 -.03" mass="3"/></body>'
+    model = rftsim.load(f"<mujoco><worldbody>{foot}</worldbody></mujoco>", force="explicit")
+    data = mujoco.MjData(model)
+    data.qvel[2] = -1e-3
+    mujoco.mj_forward(model, data)
+    (one,) = resultants(model, data)
+    assert one.force[2] > 0.0
+    assert one.start == pytest.approx((0.3, 0.2, 0.0), abs=2e-3)
+
+
+def test_a_picture_larger_than_the_models_buffer_with_the_buried_showing(rest):
+    """The lower face of the box is mixed with sand; the model's own buffer stays as it was."""
+    model, data = rest
+    assert model.vis.global_.offwidth < 960
+    camera = mujoco.MjvCamera()
+    camera.lookat[:], camera.distance, camera.azimuth, camera.elevation = (0, 0, 0), 0.5, 90, -30
+    picture = render.render(model, data, camera=camera, width=960, height=700, shown=drawing.Shown(False, False))
+    assert picture.shape == (700, 960, 3)
+    assert model.vis.global_.offwidth < 960
+    red = picture[..., 0].astype(float) - picture[..., 2]
+    below = red[350:, 480]  # from the surface in front of the box down
+    sand = np.median(red[600:, :100])
+    assert below.max() > sand + 20.0, "something red shows through the sand"
+
+
+def test_the_camera_shows_all_that_moves(rest):
+    model, data = rest
+    camera = render.framing(model, data)
+    with render.Pictures(model, 480, 270) as pictures:
+        picture = pictures.take(data, camera)
+    assert picture.std() > 5.0
+    assert camera.distance > 0.3
+    assert camera.lookat == pytest.approx(bounds(model, data)[0])
+    assert corners(model, data).shape == (16, 3)
+
+
+def test_the_sand_is_found_under_a_prefix():
+    """Of a model that was attached under another's prefix, too."""
+    part = mujoco.MjSpec.from_string(SCENE)
+    rftsim.add_sand(part)
+    whole = mujoco.MjSpec()
+    whole.attach(part, prefix="mine/", frame=whole.worldbody.add_frame())
+    model = whole.compile()
+    assert [model.geom(geom).name for geom in sand_planes(model)] == ["mine/sand_surface"]
