@@ -7,7 +7,7 @@ import pytest
 import rftsim
 from rftsim.model.readout import sand_planes
 from rftsim.model.standing import standing
-from rftsim.view import drawing, render
+from rftsim.view import drawing, look, render
 from rftsim.view.bounds import bounds, corners
 from rftsim.view.forces import resultants
 
@@ -127,3 +127,24 @@ def test_the_sand_is_found_under_a_prefix():
     whole.attach(part, prefix="mine/", frame=whole.worldbody.add_frame())
     model = whole.compile()
     assert [model.geom(geom).name for geom in sand_planes(model)] == ["mine/sand_surface"]
+
+
+def test_the_block_of_sand_has_its_upper_face_on_the_surface():
+    """On a slope and far away, moved by whole periods of the texture along the surface."""
+    terrain = rftsim.FreeSurface(0.3, (-0.2, 0.1, 1.0))
+    model = rftsim.load(SCENE, disable_floor=True, terrain=terrain)
+    data, scene = mujoco.MjData(model), mujoco.MjvScene(model, maxgeom=100)
+    mujoco.mj_forward(model, data)
+    camera, option = mujoco.MjvCamera(), mujoco.MjvOption()
+    mujoco.mjv_updateScene(model, data, option, mujoco.MjvPerturb(), camera, mujoco.mjtCatBit.mjCAT_ALL, scene)
+    (sand,) = sand_planes(model)
+    geom = next(scene.geoms[i] for i in range(scene.ngeom) if scene.geoms[i].objid == sand)
+    before, eye, repeat = geom.pos.copy(), np.array([30.0, -50.0, 2.0]), 4.0
+    look.make_solid(geom, repeat, 0.5, eye)
+    face = geom.pos + geom.size[2] * np.array(terrain.normal)
+    assert terrain.depth(face) == pytest.approx(0.0, abs=1e-5)
+    along = np.asarray(geom.mat).reshape(3, 3).T[:2]
+    moved = along @ (face - before) * repeat / 2.0
+    assert moved == pytest.approx(moved.round(), abs=1e-4)
+    assert np.abs(along @ (face - eye)).max() <= 1.0 / repeat + 1e-4
+    assert geom.type == mujoco.mjtGeom.mjGEOM_BOX

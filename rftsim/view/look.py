@@ -5,11 +5,17 @@ from collections.abc import Iterator
 from typing import Final
 
 import mujoco
+import numpy as np
 
 from rftsim.model.readout import sand_planes
+from rftsim.surface.triangles import Array
 
 GRAINS: Final = 900
 """Pixels of the sand's texture over the extent of what can move."""
+WIDE: Final = 60.0
+"""Half the width of the block of sand in pictures, over the same."""
+THICK: Final = 0.3
+"""Half its thickness, over the same."""
 SHADED: Final = 3.0
 """Half the width of what a distant light's shadows cover, over the same."""
 
@@ -47,3 +53,22 @@ def roomy(model: mujoco.MjModel, extent: float, width: int, height: int) -> Iter
         yield
     finally:
         size.offwidth, size.offheight, shades.shadowclip = kept
+
+
+def make_solid(geom: mujoco.MjvGeom, repeat: float, extent: float, eye: Array) -> None:
+    """Make the plane of sand in a scene an opaque block, which unlike a plane casts no shadows on itself.
+
+    Args:
+        geom: The plane, as the scene has it.
+        repeat: How often its texture repeats in a metre.
+        extent: The extent of what can move [m].
+        eye: Place of the camera, around which the block lies, in whole periods of its texture [m], shape (3,).
+    """
+    axes = np.asarray(geom.mat, dtype=float).reshape(3, 3).T
+    period = 2.0 / repeat
+    for axis in axes[:2]:
+        geom.pos[:] += period * round(float((eye - geom.pos) @ axis) / period) * axis
+    thickness = THICK * extent
+    geom.pos[:] -= thickness * axes[2]
+    geom.type, geom.size[:] = mujoco.mjtGeom.mjGEOM_BOX, (WIDE * extent, WIDE * extent, thickness)
+    geom.rgba[3], geom.transparent, geom.texrepeat[:] = 1.0, 0, repeat

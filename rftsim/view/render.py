@@ -15,7 +15,7 @@ from rftsim.model.readout import instances
 from rftsim.surface.triangles import Array
 from rftsim.view.bounds import bounds, corners
 from rftsim.view.drawing import ALL, Drawing, Shown
-from rftsim.view.look import repeats, roomy
+from rftsim.view.look import make_solid, repeats, roomy
 
 Picture: TypeAlias = NDArray[np.uint8]
 """A picture, shape (height, width, 3)."""
@@ -75,7 +75,7 @@ class Pictures:
         mine = [i for i in range(scene.ngeom) if scene.geoms[i].objtype == mujoco.mjtObj.mjOBJ_GEOM]
         self._drawing.draw(scene, data, self._shown)
         for geom in (scene.geoms[i] for i in mine if scene.geoms[i].objid in self._sand):
-            geom.rgba[3], geom.transparent, geom.texrepeat[:] = 1.0, 0, self._sand[geom.objid]
+            make_solid(geom, self._sand[geom.objid], self._drawing.extent, scene.camera[0].pos)
         whole: Picture = self._renderer.render().copy()
         if self._sand:
             for geom in (scene.geoms[i] for i in mine if scene.geoms[i].objid in self._hidden):
@@ -185,7 +185,7 @@ def _endless(model: mujoco.MjModel) -> "NDArray[np.bool_]":
 def _vanish(geom: mujoco.MjvGeom) -> None:
     """Let nothing of a geom of a scene be seen."""
     geom.rgba[3], geom.transparent = 0.0, 1
-    if geom.type == _GEOM.mjGEOM_PLANE:
+    if geom.type in (_GEOM.mjGEOM_PLANE, _GEOM.mjGEOM_BOX):  # the sand is a box by now
         geom.size[:] = 1e-6
 
 
