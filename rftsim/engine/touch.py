@@ -1,7 +1,7 @@
 """The sand's share of a `touch` sensor: the pressure on those of its body's triangles that lie in the sensor's zone.
 
 MuJoCo adds up the normal forces of contacts that lie in the site's volume, or from which the way out of the body leads
-through it. Here a triangle's centroid is such a contact. The triangles' tractions are those at the twist of the moment,
+through it. Here a triangle's centroid is such a contact. The triangles' forces are those at the twist of the moment,
 and the wrench that was applied may be that at the end of the step, so they are scaled to agree with it.
 """
 
@@ -12,16 +12,16 @@ import numpy as np
 from rftsim.engine import bodies, external, instance
 from rftsim.engine.layout import CONSTANTS
 from rftsim.law import exports
-from rftsim.law.body import COLUMN, at, bed_at, body_at, centre, header_at, normal
-from rftsim.law.frame import level_frame, point_velocity
-from rftsim.law.stress import TINY
-from rftsim.law.vectors import dot, to_body, to_world
+from rftsim.law.body import header_at
+from rftsim.law.layout import PRESSED
+from rftsim.law.vectors import dot, to_world
 from rftsim.machine.compiling import exact
 from rftsim.machine.memory import doubles, int32s, matrix, pointer, release, stack_doubles, take
 from rftsim.solver.newton import CREEP, V_C
 
 _SPHERE: Final = CONSTANTS["sphere"]
 _BOX: Final = CONSTANTS["box"]
+_COLUMNS: Final = len(PRESSED)
 ALIGNED: Final = 0.9
 """Cosine between the triangles' force and the wrench's from which on the twist of the moment tells how sand presses."""
 SLOW: Final = 1e-3
@@ -44,65 +44,52 @@ def _creep(model, m, t, address, v, w):
     for k in range(instance.head(address).nbody):
         length = header_at(instance.numeric(model, m, instance.numeric_of(address, k)).ctypes.data).gyration
         bodies.twist(t, instance.body(address, k), v, w)
-        speed = np.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
-        speed += length * np.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
-        found = max(found, CREEP * speed)
+        found = max(found, CREEP * (np.sqrt(dot(v, v)) + length * np.sqrt(dot(w, w))))
     return found
 
 
 @exact
-def _fill(sand, surface, pose, v_c, force, depth):
-    """Fill the force on each triangle, body frame, (ntri, 3); their sum, (3,)."""
+def _list(sand, surface, pose, v_c, rows, force):
+    """Fill rows with the triangles that the sand may press on and their force (3,); how many they are."""
     x, r, v, w = pose
-    exports.tractions(
-        sand, surface, x.ctypes.data, r.ctypes.data, v.ctypes.data, w.ctypes.data, force.ctypes.data, depth.ctypes.data
+    return exports.pressures(
+        sand, surface, x.ctypes.data, r.ctypes.data, v.ctypes.data, w.ctypes.data, v_c, rows.ctypes.data, force
     )
-    frame, body = level_frame(bed_at(sand), x, r, v, w), body_at(surface)
-    sx = sy = sz = 0.0
-    for i in range(body.count):
-        c = centre(body, i)
-        u = point_velocity(frame, c[0], c[1], c[2])
-        square = dot(u, u)
-        size = at(body, COLUMN.area, i) * np.sqrt(square / (square + v_c * v_c + TINY))
-        for k in range(3):
-            force[i, k] *= size
-        sx, sy, sz = sx + force[i, 0], sy + force[i, 1], sz + force[i, 2]
-    return sx, sy, sz
 
 
 @exact
-def _fill_scaled(sand, surface, pose, wrench, v_c, force, depth):
-    """Fill the force on each triangle; the factor by which their sum agrees with the wrench's force."""
-    wanted = to_body(pose.turn, wrench[0], wrench[1], wrench[2])
+def _list_scaled(sand, surface, pose, wrench, v_c, rows):
+    """The same; how many, and the factor by which their force agrees with the wrench's."""
+    at = stack_doubles(3)
+    wanted, found = wrench[:3], doubles(at, 3)
     size = np.sqrt(dot(wanted, wanted))
-    found = _fill(sand, surface, pose, v_c, force, depth)
-    if dot(found, wanted) < ALIGNED * size * np.sqrt(dot(found, found)) or dot(found, found) == 0.0:
+    count = _list(sand, surface, pose, v_c, rows, at)
+    if dot(found, found) == 0.0 or dot(found, wanted) < ALIGNED * size * np.sqrt(dot(found, found)):
         for k in range(3):
-            pose.velocity[k], pose.omega[k] = -SLOW * wrench[k] / size, 0.0
-        found = _fill(sand, surface, pose, v_c, force, depth)
+            pose.velocity[k], pose.omega[k] = -SLOW * wanted[k] / size, 0.0
+        count = _list(sand, surface, pose, v_c, rows, at)
     square = dot(found, found)
-    return max(dot(found, wanted), 0.0) / square if square > 0.0 else 0.0
+    return count, max(dot(found, wanted), 0.0) / square if square > 0.0 else 0.0
 
 
 @exact
-def _in_zone(model, data, m, d, pose, site, surface, force):
+def _in_zone(model, data, m, d, pose, site, rows):
     """Sum of the forces that press on the triangles in a site's zone [N]."""
     kind = int32s(pointer(m + model.site_type), pointer(m + model.nsite))[site]
     if kind < _SPHERE or kind > _BOX:
         return 0.0  # MuJoCo's function knows no other zone
     x, turn = pointer(d + data.site_xpos) + 8 * 3 * site, pointer(d + data.site_xmat) + 8 * 9 * site
     size = pointer(m + model.site_size) + 8 * 3 * site
-    point, way = doubles(stack_doubles(3), 3), doubles(stack_doubles(3), 3)
-    body, total = body_at(surface), 0.0
-    for i in range(body.count):
-        n = normal(body, i)
-        pressing = -(n[0] * force[i, 0] + n[1] * force[i, 1] + n[2] * force[i, 2])
-        if pressing > 0.0:
-            c = to_world(pose.turn, *centre(body, i))
-            point[0], point[1], point[2] = pose.x[0] + c[0], pose.x[1] + c[1], pose.x[2] + c[2]
-            way[0], way[1], way[2] = to_world(pose.turn, n[0], n[1], n[2])
-            if external.ray_geom(x, turn, size, point.ctypes.data, way.ctypes.data, kind, 0) >= 0.0:
-                total += pressing
+    at, way = stack_doubles(3), stack_doubles(3)
+    point, outward, total = doubles(at, 3), doubles(way, 3), 0.0
+    for i in range(rows.shape[0]):
+        if rows[i, PRESSED.force] > 0.0:
+            c = to_world(pose.turn, rows[i, PRESSED.x], rows[i, PRESSED.y], rows[i, PRESSED.z])
+            n = to_world(pose.turn, rows[i, PRESSED.nx], rows[i, PRESSED.ny], rows[i, PRESSED.nz])
+            for k in range(3):
+                point[k], outward[k] = pose.x[k] + c[k], n[k]
+            if external.ray_geom(x, turn, size, at, way, kind, 0) >= 0.0:
+                total += rows[i, PRESSED.force]
     return total
 
 
@@ -114,17 +101,17 @@ def _pressed(model, data, m, d, t, address, k, site, is_implicit):
         return 0.0
     sand = instance.numeric(model, m, instance.head(address).bed).ctypes.data
     surface = instance.numeric(model, m, instance.numeric_of(address, k)).ctypes.data
-    n = body_at(surface).count
-    memory = take(8 * 4 * n)
+    n = int(header_at(surface).ntri)
+    memory = take(8 * _COLUMNS * n)
     if memory == 0:
         return 0.0
     v, w = doubles(stack_doubles(3), 3), doubles(stack_doubles(3), 3)
     v_c = _creep(model, m, t, address, v, w) if is_implicit else 0.0
     bodies.twist(t, body, v, w)
     pose = Pose(t.xpos[3 * body : 3 * body + 3], t.xmat[9 * body : 9 * body + 9], v, w)
-    force = matrix(memory, n, 3)
-    factor = _fill_scaled(sand, surface, pose, wrench, v_c, force, doubles(memory + 8 * 3 * n, n))
-    total = factor * _in_zone(model, data, m, d, pose, site, surface, force)
+    rows = matrix(memory, n, _COLUMNS)
+    count, factor = _list_scaled(sand, surface, pose, wrench, v_c, rows)
+    total = factor * _in_zone(model, data, m, d, pose, site, rows[:count])
     release(memory)
     return total
 

@@ -9,7 +9,7 @@ import pytest
 from mujoco import rollout
 from trees import SAND, shaken, spec_of, tree
 
-from rftsim import add_sand, rne_post_constraint, wrenches
+from rftsim import add_sand, rne_post_constraint, tractions, wrenches
 from rftsim.model.readings import reading_doubts
 
 G = 9.81
@@ -122,6 +122,31 @@ def test_a_ball_is_touched_by_more_than_its_weight():
     ball = '<body name="ball" pos="0 0 .05"><freejoint/><geom size=".05" mass="2"/><site name="s" size=".06"/></body>'
     data = after(on_sand(ball, '<sensor><touch name="touch" site="s"/></sensor>'))
     assert 2.0 * G < reading(data, "touch") < 4.0 * G
+
+
+@pytest.mark.parametrize("law", ["rft2d", "drft2d", "rft3d", "drft3d", "rft3d:c4"])
+def test_touch_is_the_sum_of_tractions(law):
+    """Of a body in motion, all of it in the zone: the sum of max(0, -t.n) A of `rftsim.tractions`, under every law."""
+    bodies = tree(np.random.default_rng(3), ["free"]).replace("<freejoint/>", '<freejoint/><site name="s" size="1"/>')
+    model = on_sand(bodies, '<sensor><touch name="touch" site="s"/></sensor>', force="explicit", law=law, max_edge=0.02)
+    data = shaken(model, 2)
+    faces = tractions(model, data, 1)
+    pressing = np.maximum(-np.einsum("ij,ij->i", faces.stress, faces.normal), 0.0) * faces.area
+    assert 0 < np.count_nonzero(pressing) < len(pressing)
+    assert reading(data, "touch") == pytest.approx(pressing.sum(), rel=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["sphere", "capsule", "ellipsoid", "cylinder", "box"])
+def test_zones_of_every_shape(kind):
+    """A zone that holds the whole of a ball reads all, one beside it none, one around its upper half nothing."""
+    site = '<site name="{0}" type="{1}" size=".07 .07 .07" pos="{2}"/>'
+    places = {"all": "0 0 0", "beside": "1 0 0", "upper": "0 0 .13"}
+    sites = "".join(site.format(name, kind, pos) for name, pos in places.items())
+    ball = f'<body name="ball" pos="0 0 .05"><freejoint/><geom size=".05" mass="2"/>{sites}</body>'
+    sensors = "".join(f'<touch name="{name}" site="{name}"/>' for name in places)
+    data = after(on_sand(ball, f"<sensor>{sensors}</sensor>"), 200)
+    assert reading(data, "all") > 2.0 * G
+    assert reading(data, "beside") == reading(data, "upper") == 0.0
 
 
 def test_at_first_touch_the_pressure_is_that_of_a_translation():
