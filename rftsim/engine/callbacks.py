@@ -4,16 +4,31 @@ from typing import Final
 
 from numba import types
 
-from rftsim.engine import explicit, implicit, instance, offsets, reactions, sensors
+from rftsim.engine import bodies, explicit, implicit, instance, offsets, reactions, sensors
 from rftsim.engine.layout import CONSTANTS
 from rftsim.law.layout import WRENCH
 from rftsim.machine import claims
+from rftsim.machine.compiling import inline
 from rftsim.machine.exports import address, entry
 from rftsim.machine.memory import doubles, int32s
 from rftsim.machine.registry import PLACES
 
 _RK4: Final = CONSTANTS["rk4"]
 _PASSIVE: Final = CONSTANTS["passive"]
+_NO_SENSORS: Final = CONSTANTS["no_sensors"]
+
+
+@inline
+def _is_rk4(model, m):
+    """Whether the integrator is RK4, which asks for the force at states that are not the step's."""
+    return int32s(m + model.opt_integrator, 1)[0] == _RK4
+
+
+@inline
+def _show(model, data, m, d, number):
+    """Read the wrenches as soon as they are known: between mj_step1 and mj_step2, they are those of this step."""
+    if not _is_rk4(model, m) and int32s(m + model.opt_disableflags, 1)[0] & _NO_SENSORS == 0:
+        sensors.read_wrenches(model, data, m, d, number)
 
 
 @entry(types.intc, address, types.intc, types.intc)
@@ -61,7 +76,8 @@ def advance(m, d, number):
 def add_to_reactions(m, d, number):
     """Add the sand of an instance to cfrc_ext and take it from cfrc_int, as mj_rnePostConstraint left them."""
     model, data = offsets.model(), offsets.data()
-    reactions.add_sand(model, data, m, d, instance.block_of(model, data, m, d, number))
+    t = bodies.tree(model, data, m, d)
+    reactions.add_sand(data, d, t, instance.block_of(model, data, m, d, number))
 
 
 @entry(types.intc, address, types.intc)
@@ -76,6 +92,7 @@ def explicit_compute(m, d, number, capability):
     model, data = offsets.model(), offsets.data()
     if capability == _PASSIVE:
         explicit.press(model, data, m, d, number)
+        _show(model, data, m, d, number)
     else:
         sensors.read(model, data, m, d, number, False)
 
@@ -90,10 +107,10 @@ def implicit_nstate(m, number):
 def implicit_compute(m, d, number, capability):
     """The passive force at the end of the step, or the sensors; under RK4 as the explicit one."""
     model, data = offsets.model(), offsets.data()
-    is_implicit = int32s(m + model.opt_integrator, 1)[0] != _RK4
     if capability != _PASSIVE:
-        sensors.read(model, data, m, d, number, is_implicit)
-    elif not is_implicit:
+        sensors.read(model, data, m, d, number, not _is_rk4(model, m))
+    elif _is_rk4(model, m):
         explicit.press(model, data, m, d, number)
     else:
         implicit.press(model, data, offsets.contact(), m, d, number)
+        _show(model, data, m, d, number)

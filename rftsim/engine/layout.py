@@ -38,6 +38,7 @@ CONSTANTS: Final = {
     "implicit": int(mujoco.mjtIntegrator.mjINT_IMPLICIT),
     "no_euler_damping": int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP),
     "no_damping": int(mujoco.mjtDisableBit.mjDSBL_DAMPER),
+    "no_sensors": int(mujoco.mjtDisableBit.mjDSBL_SENSOR),
     "passive": int(mujoco.mjtPluginCapabilityBit.mjPLUGIN_PASSIVE),
     "equality": int(mujoco.mjtConstraint.mjCNSTR_EQUALITY),
     "dof_friction": int(mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF),

@@ -43,9 +43,8 @@ def _add(t, body, wrench, external, internal):
 
 
 @exact
-def add_sand(model, data, m, d, address):
+def add_sand(data, d, t, address):
     """Add the wrenches of the block at an address to cfrc_ext and take them from cfrc_int, unless that is done."""
-    t = bodies.tree(model, data, m, d)
     size = WRENCH * t.parent.size
     external, internal = doubles(pointer(d + data.cfrc_ext), size), doubles(pointer(d + data.cfrc_int), size)
     wrench = doubles(stack_doubles(WRENCH), WRENCH)

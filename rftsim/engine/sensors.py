@@ -101,12 +101,22 @@ def _cut(out, cutoff):
 
 
 @inline
-def read(model, data, m, d, number, is_implicit):
-    """Mend every sensor that the sand of an instance concerns."""
+def read_wrenches(model, data, m, d, number):
+    """Read the wrench on each body that a sensor of an instance names."""
     address = instance.block_of(model, data, m, d, number)
-    reactions.add_sand(model, data, m, d, address)
+    all_sensors, readings = _sensors(model, m), pointer(d + data.sensordata)
+    for i in range(all_sensors.plugin.size):
+        if all_sensors.plugin[i] == number:
+            _read_wrench(address, all_sensors.owner[i], doubles(readings + 8 * all_sensors.start[i], WRENCH))
+
+
+@inline
+def read(model, data, m, d, number, is_implicit):
+    """Read the wrenches on an instance's bodies, and mend every sensor of MuJoCo's that they concern."""
+    address = instance.block_of(model, data, m, d, number)
     all_sensors, readings = _sensors(model, m), pointer(d + data.sensordata)
     t = bodies.tree(model, data, m, d)
+    reactions.add_sand(data, d, t, address)
     for i in range(all_sensors.kind.size):
         kind, owner, place = all_sensors.kind[i], all_sensors.owner[i], readings + 8 * all_sensors.start[i]
         if all_sensors.plugin[i] == number:
