@@ -5,6 +5,7 @@ from rftsim.errors import RftsimError, RftsimNote, RftsimWarning, SandError, Sce
 from rftsim.law.laws import LAWS, Law
 from rftsim.law.rigid import SurfaceForce, surface_force
 from rftsim.model.add_sand import Bed, add_sand, load
+from rftsim.model.reactions import rne_post_constraint
 from rftsim.model.readout import Instance, Tractions, Work, Wrenches, instances, tractions, work, wrenches
 from rftsim.sand.free_surface import FreeSurface
 from rftsim.sand.medium import Sand

@@ -4,8 +4,9 @@ The numbers are found by name. A numeric is a body's surface, or a bed's paramet
 is the body's, or the instance's, name; so MJCF attachment may put any prefix and suffix around both.
 
 What belongs to an mjData (`plugin_data` is its number in the registry) is one block: a record of BLOCK_HEAD, one of
-MEMBER for each body, each body's last wrench (WRENCH numbers), a record of COUNTERS, and the state after the step under
-way. What must last is MuJoCo's `plugin_state`, and is brought up to date only when a step ends.
+MEMBER for each body, each body's last wrench (WRENCH numbers), what was left in MuJoCo's cfrc_ext for each (as many), a
+record of COUNTERS, and the state after the step under way. What must last is MuJoCo's `plugin_state`, and is brought up
+to date only when a step ends.
 """
 
 import ctypes
@@ -45,15 +46,21 @@ def wrenches_start(nbody: Any) -> Any:
 
 
 @exact_kernel
+def marks_start(nbody: Any) -> Any:
+    """Bytes of a block before what was left in cfrc_ext."""
+    return _HEAD + (_MEMBER + _WRENCH) * nbody
+
+
+@exact_kernel
 def counters_start(nbody: Any) -> Any:
     """Bytes of a block before its counters."""
-    return _HEAD + (_MEMBER + _WRENCH) * nbody
+    return _HEAD + (_MEMBER + 2 * _WRENCH) * nbody
 
 
 @exact_kernel
 def state_start(nbody: Any) -> Any:
     """Bytes of a block before its state."""
-    return _HEAD + (_MEMBER + _WRENCH) * nbody + _COUNTERS
+    return counters_start(nbody) + _COUNTERS
 
 
 class Block(NamedTuple):

@@ -4,35 +4,31 @@ from typing import Final
 
 from numba import types
 
-from rftsim.engine import explicit, implicit, instance, offsets
+from rftsim.engine import bodies, explicit, implicit, instance, offsets, reactions, sensors
 from rftsim.engine.layout import CONSTANTS
 from rftsim.law.layout import WRENCH
 from rftsim.machine import claims
 from rftsim.machine.compiling import inline
 from rftsim.machine.exports import address, entry
-from rftsim.machine.memory import doubles, int32s, pointer
+from rftsim.machine.memory import doubles, int32s
 from rftsim.machine.registry import PLACES
-from rftsim.solver import linear_algebra
 
 _RK4: Final = CONSTANTS["rk4"]
 _PASSIVE: Final = CONSTANTS["passive"]
+_NO_SENSORS: Final = CONSTANTS["no_sensors"]
 
 
 @inline
-def _sense(model, data, m, d, number):
-    """Copy each body's wrench to the sensors that name it."""
-    address = instance.block_of(model, data, m, d, number)
-    nsensor = pointer(m + model.nsensor)
-    plugins = int32s(pointer(m + model.sensor_plugin), nsensor)
-    objects = int32s(pointer(m + model.sensor_objid), nsensor)
-    start = int32s(pointer(m + model.sensor_adr), nsensor)
-    for sensor in range(nsensor):
-        if plugins[sensor] != number:
-            continue
-        out = doubles(pointer(d + data.sensordata) + 8 * start[sensor], WRENCH)
-        for k in range(instance.head(address).nbody):
-            if instance.body(address, k) == objects[sensor]:
-                linear_algebra.copy(instance.wrench(address, k), out)
+def _is_rk4(model, m):
+    """Whether the integrator is RK4, which asks for the force at states that are not the step's."""
+    return int32s(m + model.opt_integrator, 1)[0] == _RK4
+
+
+@inline
+def _show(model, data, m, d, number):
+    """Read the wrenches as soon as they are known: between mj_step1 and mj_step2, they are those of this step."""
+    if not _is_rk4(model, m) and int32s(m + model.opt_disableflags, 1)[0] & _NO_SENSORS == 0:
+        sensors.read_wrenches(model, data, m, d, number)
 
 
 @entry(types.intc, address, types.intc, types.intc)
@@ -76,6 +72,14 @@ def advance(m, d, number):
     instance.keep(offsets.model(), offsets.data(), m, d, number)
 
 
+@entry(types.void, address, address, types.intc)
+def add_to_reactions(m, d, number):
+    """Add the sand of an instance to cfrc_ext and take it from cfrc_int, as mj_rnePostConstraint left them."""
+    model, data = offsets.model(), offsets.data()
+    t = bodies.tree(model, data, m, d)
+    reactions.add_sand(data, d, t, instance.block_of(model, data, m, d, number))
+
+
 @entry(types.intc, address, types.intc)
 def explicit_nstate(m, number):
     """The number of numbers that last from step to step."""
@@ -88,8 +92,9 @@ def explicit_compute(m, d, number, capability):
     model, data = offsets.model(), offsets.data()
     if capability == _PASSIVE:
         explicit.press(model, data, m, d, number)
+        _show(model, data, m, d, number)
     else:
-        _sense(model, data, m, d, number)
+        sensors.read(model, data, m, d, number, False)
 
 
 @entry(types.intc, address, types.intc)
@@ -103,8 +108,9 @@ def implicit_compute(m, d, number, capability):
     """The passive force at the end of the step, or the sensors; under RK4 as the explicit one."""
     model, data = offsets.model(), offsets.data()
     if capability != _PASSIVE:
-        _sense(model, data, m, d, number)
-    elif int32s(m + model.opt_integrator, 1)[0] == _RK4:
+        sensors.read(model, data, m, d, number, not _is_rk4(model, m))
+    elif _is_rk4(model, m):
         explicit.press(model, data, m, d, number)
     else:
         implicit.press(model, data, offsets.contact(), m, d, number)
+        _show(model, data, m, d, number)

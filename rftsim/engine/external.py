@@ -7,3 +7,8 @@ rne = types.ExternalFunction("mj_rne", types.void(types.intp, types.intp, types.
 reference_constraint = types.ExternalFunction("mj_referenceConstraint", types.void(types.intp, types.intp))
 is_sparse = types.ExternalFunction("mj_isSparse", types.intc(types.intp))
 smooth_vel = types.ExternalFunction("mjd_smooth_vel", types.void(types.intp, types.intp, types.intc))
+ray_geom = types.ExternalFunction(
+    "mju_rayGeom",
+    types.float64(types.intp, types.intp, types.intp, types.intp, types.intp, types.intc, types.intp),
+)
+"""From place, orientation and size of a geom, a point, a direction, and the geom's type; then where its normal goes."""

@@ -127,6 +127,12 @@ def all_wrenches(address):
 
 
 @exact
+def mark(address, k):
+    """The numbers that were left in cfrc_ext for the k-th body of a block, (WRENCH,)."""
+    return doubles(address + block.marks_start(head(address).nbody) + 8 * WRENCH * k, WRENCH)
+
+
+@exact
 def counters(address):
     """The address of a block's counters."""
     return address + block.counters_start(head(address).nbody)
@@ -219,8 +225,9 @@ def copy(model, data, target, m, origin, instance):
 
 @exact
 def forget(address):
-    """Clear the wrenches and counters of the block at an address."""
-    past = doubles(address + block.wrenches_start(head(address).nbody), all_wrenches(address).size + _COUNTERS)
+    """Clear the wrenches, marks and counters of the block at an address."""
+    first = block.wrenches_start(head(address).nbody)
+    past = doubles(address + first, (counters(address) - address - first) // 8 + _COUNTERS)
     for i in range(past.size):
         past[i] = 0.0
 

@@ -38,6 +38,7 @@ CONSTANTS: Final = {
     "implicit": int(mujoco.mjtIntegrator.mjINT_IMPLICIT),
     "no_euler_damping": int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP),
     "no_damping": int(mujoco.mjtDisableBit.mjDSBL_DAMPER),
+    "no_sensors": int(mujoco.mjtDisableBit.mjDSBL_SENSOR),
     "passive": int(mujoco.mjtPluginCapabilityBit.mjPLUGIN_PASSIVE),
     "equality": int(mujoco.mjtConstraint.mjCNSTR_EQUALITY),
     "dof_friction": int(mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF),
@@ -47,11 +48,18 @@ CONSTANTS: Final = {
     "frictionless_contact": int(mujoco.mjtConstraint.mjCNSTR_CONTACT_FRICTIONLESS),
     "pyramidal_contact": int(mujoco.mjtConstraint.mjCNSTR_CONTACT_PYRAMIDAL),
     "elliptic_contact": int(mujoco.mjtConstraint.mjCNSTR_CONTACT_ELLIPTIC),
+    "touch": int(mujoco.mjtSensor.mjSENS_TOUCH),
+    "force": int(mujoco.mjtSensor.mjSENS_FORCE),
+    "torque": int(mujoco.mjtSensor.mjSENS_TORQUE),
+    "sphere": int(mujoco.mjtGeom.mjGEOM_SPHERE),
+    "box": int(mujoco.mjtGeom.mjGEOM_BOX),
 }
 """Those that are compiled in."""
 GIVEN: Final = repr(CONSTANTS)
 """All that machine code of the engine is made from beside its sources."""
-FUNCTIONS: Final = ("mj_fwdActuation", "mj_rne", "mj_referenceConstraint", "mj_isSparse", "mjd_smooth_vel")
+FUNCTIONS: Final = (
+    *("mj_fwdActuation", "mj_rne", "mj_referenceConstraint", "mj_isSparse", "mjd_smooth_vel", "mju_rayGeom"),
+)
 """Those that compiled code calls by name, see `external`."""
 SYMBOL: Final = "rftsim_layout"
 """Where it reads the offsets, int64: those of Model, Data and Contact, one after another; see `offsets`."""
@@ -67,6 +75,7 @@ class Model(NamedTuple):
     nbody: int
     nv: int
     nnumeric: int
+    nsite: int
     nsensor: int
     nplugin: int
     body_parentid: int
@@ -78,8 +87,17 @@ class Model(NamedTuple):
     numeric_adr: int
     numeric_size: int
     numeric_data: int
+    site_bodyid: int
+    site_type: int
+    site_size: int
+    sensor_type: int
     sensor_objid: int
     sensor_adr: int
+    sensor_cutoff: int
+    sensor_history: int
+    sensor_historyadr: int
+    sensor_delay: int
+    sensor_interval: int
     sensor_plugin: int
     names: int
     name_bodyadr: int
@@ -103,6 +121,8 @@ class Data(NamedTuple):
     """Byte offsets of fields in MuJoCo's struct mjData."""
 
     nefc: int
+    time: int
+    history: int
     contact: int
     plugin_data: int
     plugin_state: int
@@ -126,10 +146,14 @@ class Data(NamedTuple):
     efc_KBIP: int
     xpos: int
     xmat: int
+    site_xpos: int
+    site_xmat: int
     cvel: int
     subtree_com: int
     cdof: int
     qfrc_passive: int
+    cfrc_int: int
+    cfrc_ext: int
     sensordata: int
 
 
@@ -168,7 +192,7 @@ def _struct(name: str) -> type[ctypes.Structure]:
 
 _PROBE = """
 <mujoco>
-  <worldbody><body><joint limited="true" range="10 20" damping="1" frictionloss="1"/><geom size="1"/></body>
+  <worldbody><body><joint limited="true" range="10 20" damping="1" frictionloss="1"/><geom size="1"/><site/></body>
     <geom type="plane" size="1 1 1"/></worldbody>
   <option jacobian="sparse"/>
   <custom><numeric name="n" data="1 2"/></custom>

@@ -42,6 +42,11 @@ class _Plugin(ctypes.Structure):
 _keep: list[Any] = []  # MuJoCo holds addresses of what is here, so it is never released
 
 
+def slots() -> frozenset[int]:
+    """The slots of both plugins, as a model's `plugin` names that of each of its instances."""
+    return frozenset(register(name) for name in (EXPLICIT, IMPLICIT))
+
+
 @functools.cache
 def register(name: str) -> int:
     """Register one of the plugins with MuJoCo, once in a process.
@@ -65,7 +70,7 @@ def register(name: str) -> int:
     plugin.name = name.encode()
     bits = mujoco.mjtPluginCapabilityBit
     plugin.capabilityflags = bits.mjPLUGIN_PASSIVE | bits.mjPLUGIN_SENSOR
-    plugin.needstage = mujoco.mjtStage.mjSTAGE_VEL
+    plugin.needstage = mujoco.mjtStage.mjSTAGE_ACC  # when MuJoCo has read the sensors of forces that are mended
     kind = "explicit" if name == EXPLICIT else "implicit"
     for field in ("nsensordata", "init", "destroy", "copy", "reset", "advance"):
         setattr(plugin, field, address(f"rftsim_{field}"))

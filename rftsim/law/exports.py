@@ -16,6 +16,7 @@ from rftsim.law.body import bed_at, body_at, header_at, medium_at
 from rftsim.law.frame import level_frame
 from rftsim.law.free_surface import lowest_depth
 from rftsim.law.laws import RESPONSES, Response
+from rftsim.law.layout import PRESSED
 from rftsim.law.leading import SHARP, Edge
 from rftsim.law.vectors import to_world
 from rftsim.law.wheel_drop import dropped
@@ -49,6 +50,7 @@ def by_response(make: Callable[[Response], Any]) -> Any:
 
 
 _drop, _sums, _tractions = by_response(dropped), by_response(sums.sums), by_response(sums.tractions)
+_pressures = by_response(sums.pressures)
 _ahead, _derivative = by_response(sums.sums_ahead), by_response(derivatives.derivative)
 
 
@@ -100,6 +102,26 @@ def tractions(bed, surface, xpos, xmat, velocity, omega, stress, depth):
     frame = _drop(record.response, (body, _level(record, xpos, xmat, velocity, omega), medium))
     out = matrix(stress, body.count, 3), doubles(depth, body.count)
     _tractions(record.response, (body, frame, medium, edge, out[0], out[1]))
+
+
+@entry(types.intp, *[address] * 6, types.float64, address, address)
+def pressures(bed, surface, xpos, xmat, velocity, omega, v_c, rows, force):
+    """How many triangles the sand may press on; each has a row of columns PRESSED. Their force, world frame, (3,).
+
+    The force is that at the velocity of the moment, times |v| / sqrt(|v|^2 + v_c^2); rows hold as many as there are
+    triangles.
+    """
+    record, body, out = bed_at(bed), body_at(surface), doubles(force, 3)
+    level = _level(record, xpos, xmat, velocity, omega)
+    out[0] = out[1] = out[2] = 0.0
+    if deepest_corner(surface, level) <= 0.0:
+        return 0
+    medium, edge = medium_at(bed), _edge(surface, SHARP)
+    dropped_frame = _drop(record.response, (body, level, medium))
+    table = matrix(rows, body.count, len(PRESSED))
+    count, total = _pressures(record.response, (body, dropped_frame, medium, edge, v_c, table))
+    out[0], out[1], out[2] = to_world(doubles(xmat, 9), total.fx, total.fy, total.fz)
+    return count
 
 
 @entry(types.void, *[address] * 7)

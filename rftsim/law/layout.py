@@ -62,6 +62,22 @@ class Columns(NamedTuple):
 
 COLUMN: Final = Columns(*range(len(Columns._fields)))
 """Which column holds what: centre [m], outward normal, area [m^2]."""
+
+
+class Pressed(NamedTuple):
+    """Numbers per triangle that the sand presses on, each a column."""
+
+    x: int
+    y: int
+    z: int
+    nx: int
+    ny: int
+    nz: int
+    force: int
+
+
+PRESSED: Final = Pressed(*range(len(Pressed._fields)))
+"""Which column holds what: centre [m], outward normal, the sand's force against it [N]; body frame."""
 BLOCK: Final = 32
 """Triangles that are passed over together where the box of their centroids lies above the sand; the boxes stand behind
 the columns."""

@@ -11,6 +11,7 @@ from rftsim.law import body as bodies
 from rftsim.law.frame import point_velocity
 from rftsim.law.free_surface import depth, rising, up
 from rftsim.law.laws import Response
+from rftsim.law.layout import PRESSED
 from rftsim.law.leading import reach2
 from rftsim.law.selection import CAPACITY, LOOK, area, centre, choosing, chosen_on_stack, filled_up, next_run, normal
 from rftsim.law.stress import TINY
@@ -132,6 +133,42 @@ def sums_ahead(response: Response) -> Any:
         return now, after
 
     return summed
+
+
+def pressures(response: Response) -> Any:
+    """Make the loop that lists the triangles which the sand can act on, with the force that presses on each."""
+    choose, stress, felt_depth = choosing(response, ahead=False), response.stress, response.felt_depth
+
+    @inline_loop
+    def add(chosen, n, frame, medium, edge, v_c, out, total):
+        for i in range(n):
+            (x, y, z), (nx, ny, nz), a = centre(chosen, i), normal(chosen, i), area(chosen, i)
+            v = point_velocity(frame, x, y, z)
+            speed2 = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
+            slow = np.sqrt(speed2 / (speed2 + v_c * v_c + TINY))
+            s = stress((nx, ny, nz), v, up(x, y, z, frame), frame, medium, edge)
+            deep = depth(x, y, z, frame)
+            held = a * s.inertia if deep > 0.0 else 0.0
+            g = _force(s, slow * a * larger(felt_depth(deep, medium), 0.0), held)
+            out[i, PRESSED.x], out[i, PRESSED.y], out[i, PRESSED.z] = x, y, z
+            out[i, PRESSED.nx], out[i, PRESSED.ny], out[i, PRESSED.nz] = nx, ny, nz
+            out[i, PRESSED.force] = larger(-(g[0] * nx + g[1] * ny + g[2] * nz), 0.0)
+            total = _added(total, g, x, y, z)
+        return total
+
+    @inline_loop
+    def listed(body, frame, medium, edge, v_c, out):
+        """Fill rows of out with columns PRESSED; how many there are, and the wrench on all of them."""
+        chosen, n, reach, last = chosen_on_stack(), 0, reach2(edge), 0
+        count, total = 0, _nothing()
+        while last < body.count:
+            n, last = choose(body, last, frame, 0.0, reach, 0.0, chosen, n)
+            if n > CAPACITY - LOOK or last >= body.count:
+                total = add(chosen, n, frame, medium, edge, v_c, out[count:], total)
+                count, n = count + n, 0
+        return count, total
+
+    return listed
 
 
 def tractions(response: Response) -> Any:

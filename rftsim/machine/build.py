@@ -22,7 +22,9 @@ _PARTS: Final = {
 _GIVING: Final = ("machine.link", "law.layout", "engine.layout")
 """The modules that know what the machine code is keyed by."""
 _C: Final = {numba_types.void: "void", numba_types.intp: "i64", numba_types.intc: "i32", numba_types.float64: "double"}
-_OUTSIDE: Final = re.compile(r"rftsim_\w+|mjd?_\w+|PyMem_RawMalloc|PyMem_RawCalloc|PyMem_RawFree|atan2|sqrt|llvm\..*")
+_OUTSIDE: Final = re.compile(
+    r"rftsim_\w+|mj[du]?_\w+|PyMem_RawMalloc|PyMem_RawCalloc|PyMem_RawFree|atan2|sqrt|llvm\..*"
+)
 """Names that an object may take from elsewhere."""
 _RAISED: Final = re.compile(r'(@\.const\.pickledata\.\S+ = .*\[\d+ x i8\]) c"[^"]*"')
 """Errors that numba would raise, which may name files of this machine; nobody reads them."""
