@@ -10,9 +10,9 @@ from gymnasium.envs.mujoco import MujocoEnv
 from gymnasium.envs.registration import EnvSpec, load_env_creator
 from numpy.typing import NDArray
 
-import rftsim
 from rftsim.errors import SceneError
 from rftsim.law.laws import Law
+from rftsim.model.reactions import rne_post_constraint
 from rftsim.sand.medium import Sand
 from rftsim_envs.gymnasium_on_sand import registered
 from rftsim_envs.sandy_floor import OPTIONS, Recipe, turn_to_sand
@@ -50,16 +50,11 @@ class OnSand(MujocoEnv):
 
     def _step_mujoco_simulation(self, ctrl: NDArray[np.float32], n_frames: int) -> None:
         super()._step_mujoco_simulation(ctrl, n_frames)  # type: ignore[no-untyped-call]
-        _count_sand(self.model, self.data)
+        rne_post_constraint(self.model, self.data)  # as Gymnasium does, and with the sand's force
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickles and copies are new environments with the same settings, as Gymnasium has it."""
         return _again, (self.env_id, self.recipe, self._options, self.spec)
-
-
-def _count_sand(model: mujoco.MjModel, data: mujoco.MjData) -> None:
-    """Count the sand's force among the external ones, from which observations and costs of contacts come."""
-    getattr(rftsim, "rne_post_constraint", mujoco.mj_rnePostConstraint)(model, data)
 
 
 def _class(env_id: str) -> Any:

@@ -28,6 +28,7 @@ from rftsim.model.floors import (
     say_ground,
 )
 from rftsim.model.geometry import Geoms, Meshes
+from rftsim.model.readings import reading_doubts
 from rftsim.model.shaping import Fineness
 from rftsim.model.standing import stand
 from rftsim.model.start import start
@@ -170,6 +171,7 @@ def add_sand(
     if not keep_floor:
         choices = say_ground(site.ground, floors, remove_floors(spec, floors)) + choices
     notes = [*felt.doubts, *doubts.gravity_doubts(draft.model, bed_sand)]
+    notes += reading_doubts(draft.model, [draft.model.body(body).id for body in felt.surfaces])
     notes += floor_doubts(floors) if keep_floor else []
     notes += _standing_doubts(draft.model, numbers, felt, floors)
     _tell(choices, notes)

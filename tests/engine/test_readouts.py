@@ -317,6 +317,7 @@ def test_delays_and_intervals():
     assert seen[-1]["touch"][0] > 10.0
 
 
+@pytest.mark.filterwarnings("ignore::rftsim.RftsimWarning")  # add_sand says it too
 def test_doubts_name_what_cannot_read_sand():
     """One line a kind: contact sensors that watch the foot, late touch, meshes as zones, user sensors; else none."""
     mesh = '<asset><mesh name="tip" vertex="0 0 0 .1 0 0 0 .1 0 0 0 .1"/></asset>'

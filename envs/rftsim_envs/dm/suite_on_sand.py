@@ -35,8 +35,7 @@ def on_sand(
     """One of the suite's environments with its floor turned to sand.
 
     Specifications and rewards are its own. While an episode is prepared, the floor is solid, because tasks place
-    robots so that they touch nothing. MuJoCo's touch, force and torque sensors know nothing of the sand's force, so
-    observations of them lack it; `rftsim.wrenches(env.physics.model.ptr, env.physics.data.ptr)` has it.
+    robots so that they touch nothing. Touch, force and torque sensors read the sand as they read that floor.
 
     Args:
         domain_name: Name of a domain, as `quadruped`.
