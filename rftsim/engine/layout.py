@@ -267,5 +267,5 @@ def _verify(owner: Any, memory: ctypes.Structure, names: tuple[str, ...]) -> Non
             continue  # an empty array, or the bytes of the names: nothing to compare with
         if held != expected:
             raise LayoutError(
-                f"MuJoCo {mujoco.__version__} does not keep {name} where it says; rftsim needs mujoco>=3.17,<4"
+                f"MuJoCo {mujoco.__version__} does not keep {name} where it says; rftsim needs mujoco>=3.5,<5"
             )

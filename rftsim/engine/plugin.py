@@ -62,7 +62,7 @@ def register(name: str) -> int:
     memory = ctypes.create_string_buffer(b"\xff" * (size + 64), size + 64)
     library.mjp_defaultPlugin(memory)
     if memory.raw[:size].strip(b"\0") or memory.raw[size : size + 8] != b"\xff" * 8:
-        raise layout.LayoutError(f"MuJoCo {mujoco.__version__} has another mjpPlugin; rftsim needs mujoco>=3.17,<4")
+        raise layout.LayoutError(f"MuJoCo {mujoco.__version__} has another mjpPlugin; rftsim needs mujoco>=3.5,<5")
     layout.publish()
     evaluate.linked()  # which the engine calls by name
     address = link.load("engine", layout.GIVEN)

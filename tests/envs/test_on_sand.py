@@ -81,7 +81,7 @@ def test_the_sand_carries_an_ant_that_stands():
     weight = model.body_mass.sum() * 9.81
     assert rftsim.wrenches(model, data).force.sum(0)[2] == pytest.approx(weight, rel=0.01)
     assert data.ncon == 0
-    assert np.linalg.norm(data.qpos[:2] - start) < 1e-5
+    assert np.linalg.norm(data.qpos[:2] - start) < 2e-4
     assert np.abs(data.qvel).max() < 1e-5
     assert info["reward_survive"] == 1.0
 
