@@ -73,6 +73,26 @@ def spread(labels: Labels, points: Array, weights: Array) -> Array:
     return _sums(labels, (weights * np.einsum("ij,ij->i", apart, apart))[:, None])[:, 0]
 
 
+def fused(labels: Labels, count: int, costs: Array, points: Array, weights: Array) -> Labels:
+    """The labels after up to so many clusters went into their nearest, the cheapest pairs first, each once at most.
+
+    Args:
+        labels: Cluster of each point, 0 to n - 1, shape (npoint,).
+        count: Clusters that are to vanish.
+        costs: Cost of each cluster, two of which make that of a pair, shape (n,).
+        points: Places of the points, shape (npoint, k).
+        weights: Weight of each point, shape (npoint,).
+    """
+    means = _means(labels, points, weights)
+    near, into = _neighbours(means), np.arange(len(means))
+    taken = np.zeros(len(means), dtype=bool)
+    for one in np.argsort(costs + costs[near], kind="stable").tolist():
+        other = int(near[one])
+        if count > 0 and not taken[one] and not taken[other]:
+            taken[[one, other]], into[one], count = True, other, count - 1
+    return np.unique(into[labels], return_inverse=True)[1]
+
+
 def _means(labels: Labels, points: Array, weights: Array) -> Array:
     """Weighted means of the points of each cluster, (n, k)."""
     return _sums(labels, weights[:, None] * points) / np.bincount(labels, weights)[:, None]
@@ -101,6 +121,17 @@ def _nearest(points: Array, means: Array) -> Labels:
     for start in range(0, len(points), CHUNK):
         part = slice(start, start + CHUNK)
         found[part] = np.argmin(place[part] @ across + square, axis=1)
+    return found
+
+
+def _neighbours(means: Array) -> Labels:
+    """The nearest other mean to each, (n,)."""
+    square, found = (means**2).sum(axis=1), np.empty(len(means), dtype=np.intp)
+    for start in range(0, len(means), CHUNK):
+        part = np.arange(start, min(start + CHUNK, len(means)))
+        apart = square - 2.0 * means[part] @ means.T
+        apart[np.arange(len(part)), part] = np.inf
+        found[part] = apart.argmin(axis=1)
     return found
 
 

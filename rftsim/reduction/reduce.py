@@ -14,7 +14,7 @@ import numpy as np
 
 from rftsim.law import evaluate, layout
 from rftsim.law.layout import BLOCK
-from rftsim.reduction.facets import Labels, features, merged, settled, split, spread
+from rftsim.reduction.facets import Labels, features, fused, merged, settled, split, spread
 from rftsim.reduction.measure import Compared
 from rftsim.reduction.samples import DEPTHS, HELD_BACK, Reach, Samples, draw, free_reach, nearness, some_of
 from rftsim.surface.triangles import Array, Surface
@@ -30,8 +30,10 @@ FEWEST: Final = 8
 """Facets of the first attempt."""
 GROWTH: Final = 1.1, 2.0
 """Facets of the next attempt over those of the last, at least and at most."""
-EVEN: Final = 32
+EVEN: Final = 64
 """Facets up to which those are split whose triangles lie farthest apart; it is too early to look at errors."""
+FUSED: Final = 0.08, 0.015
+"""Share of the facets that pass which are fused with others, at first, and when it is given up."""
 CLOSE: Final = 1.06
 """Facets that pass over facets that do not, below which none between are tried."""
 
@@ -129,7 +131,12 @@ class _Search:
         return Compared(self.surface, self.bed, self.drawn(CHECKING, HELD_BACK))
 
     def fewest(self) -> _Attempt | None:
-        """The fewest facets that pass, None where no fewer than the triangles do: growing, then between the last."""
+        """The fewest facets found that pass; None where no fewer than the triangles do."""
+        found = self._divided()
+        return None if found is None else self._thinned(found)
+
+    def _divided(self) -> _Attempt | None:
+        """The fewest that pass of ever more facets, then between the last that do not and those; None as above."""
         failed, count = self._attempt(np.zeros(self.surface.ntri, dtype=np.intp)), FEWEST
         passed = None
         while passed is None:
@@ -147,6 +154,19 @@ class _Search:
             if tried is None or not failed.facets.ntri < tried.facets.ntri < passed.facets.ntri:
                 break
             passed, failed = (tried, failed) if self._passes(tried) else (passed, tried)
+        return passed
+
+    def _thinned(self, passed: _Attempt) -> _Attempt:
+        """Fewer facets that pass, in the samples that show where facets err too: those that err least are fused."""
+        share, given_up = FUSED
+        while share > given_up and passed.facets.ntri > 1:
+            costs = self._shares(passed.labels, passed.facets)
+            places = self.points, self.surface.areas
+            tried = self._attempt(fused(passed.labels, math.ceil(share * passed.facets.ntri), costs, *places))
+            if self._passes(tried) and self.steering.worst(tried.facets, self.tolerance) <= self.tolerance:
+                passed = tried
+            else:
+                share /= 2
         return passed
 
     def _passes(self, tried: _Attempt) -> bool:

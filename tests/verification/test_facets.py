@@ -12,7 +12,7 @@ from shapes import ONE, blob, rim
 from rftsim import PRESETS, FreeSurface, make_surface, surface_force
 from rftsim.law.laws import get_law
 from rftsim.law.layout import BLOCK, pack_bed
-from rftsim.reduction.facets import merged, settled, split
+from rftsim.reduction.facets import fused, merged, settled, split
 from rftsim.reduction.measure import errors, scaled_wrenches
 from rftsim.reduction.reduce import reduced
 from rftsim.reduction.samples import DEPTHS, HELD_BACK, draw, free_reach
@@ -82,6 +82,15 @@ def test_splitting_and_settling_cover_all_triangles():
         assert np.array_equal(np.unique(labels), np.arange(count))
     settled_labels = settled(labels, points, surface.areas)
     assert np.array_equal(np.unique(settled_labels), np.arange(settled_labels.max() + 1))
+
+
+def test_fusing_takes_the_cheapest_pairs():
+    """Each cluster goes into its nearest, once at most, as many as were asked for."""
+    points, weights = np.array([[0.0], [0.1], [1.0], [1.1], [5.0], [5.2]]), np.ones(6)
+    apart, costs = np.arange(6), np.array([9.0, 9.0, 1.0, 1.0, 5.0, 5.0])
+    np.testing.assert_array_equal(fused(apart, 1, costs, points, weights), [0, 1, 2, 2, 3, 4])
+    np.testing.assert_array_equal(fused(apart, 2, costs, points, weights), [0, 1, 2, 2, 3, 3])
+    np.testing.assert_array_equal(fused(apart, 9, costs, points, weights), [0, 0, 1, 1, 2, 2])
 
 
 def fresh_error(surface, facets, seeds, depths):
