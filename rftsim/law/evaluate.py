@@ -19,7 +19,7 @@ def linked() -> Callable[[str], int]:
 
 @functools.cache
 def _function(name: str, arguments: int) -> Any:
-    """An exported function that takes addresses and gives nothing."""
+    """An exported function that takes addresses, and counts, and gives nothing."""
     return ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * arguments)(linked()(name))
 
 
@@ -47,9 +47,6 @@ def body_wrenches(bed: Array, surface: Array, xpos: Array, xmat: Array, velocity
     """
     out = np.empty((len(xpos), 6))
     arrays = [*(np.ascontiguousarray(x, dtype=float) for x in (xpos, xmat, velocity, omega)), out]
-    rows = zip(*(range(a.ctypes.data, a.ctypes.data + a.nbytes, a.strides[0]) for a in arrays), strict=True)
-    fixed = bed.ctypes.data, surface.ctypes.data
-    wrench = _function("rftsim_wrench", 7)
-    for row in rows:
-        wrench(*fixed, *row)
+    fixed = bed.ctypes.data, surface.ctypes.data, len(out)
+    _function("rftsim_wrenches", 8)(*fixed, *(array.ctypes.data for array in arrays))
     return out

@@ -94,6 +94,14 @@ def wrench(bed, surface, xpos, xmat, velocity, omega, out):
     _to_world(doubles(xmat, 9), _sums(record.response, (body, frame, medium, edge)), total)
 
 
+@entry(types.void, *[address] * 2, types.intp, *[address] * 5)
+def wrenches(bed, surface, count, xpos, xmat, velocity, omega, out):
+    """The wrenches of so many poses and motions, one after another in each array."""
+    for i in range(count):
+        vector = 24 * i
+        wrench(bed, surface, xpos + vector, xmat + 72 * i, velocity + vector, omega + vector, out + 48 * i)
+
+
 @entry(types.void, *[address] * 8)
 def tractions(bed, surface, xpos, xmat, velocity, omega, stress, depth):
     """Stress of each triangle in the body frame, (ntri, 3), and effective depth, (ntri,)."""

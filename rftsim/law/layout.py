@@ -164,8 +164,8 @@ def _rim_angles(surface: Surface, header: Any) -> tuple[Array, Array]:
 
 def _boxes(surface: Surface) -> Array:
     """Boxes of the centroids of each BLOCK of triangles, numbers of BOX, (nblock, 6)."""
-    blocks = [surface.centres[start : start + BLOCK] for start in range(0, surface.ntri, BLOCK)]
-    low, high = (np.array([end(block, axis=0) for block in blocks]) for end in (np.min, np.max))
+    starts = np.arange(0, surface.ntri, BLOCK)
+    low, high = (end.reduceat(surface.centres, starts, axis=0) for end in (np.minimum, np.maximum))
     return np.hstack([low + high, high - low]) / 2
 
 

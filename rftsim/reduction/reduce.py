@@ -34,7 +34,7 @@ EVEN: Final = 64
 """Facets up to which those are split whose triangles lie farthest apart; it is too early to look at errors."""
 FUSED: Final = 0.08, 0.015
 """Share of the facets that pass which are fused with others, at first, and when it is given up."""
-CLOSE: Final = 1.06
+CLOSE: Final = 1.3
 """Facets that pass over facets that do not, below which none between are tried."""
 
 
