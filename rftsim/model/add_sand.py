@@ -170,10 +170,8 @@ def add_sand(
     choices = [*felt.choices, *_integrate(spec, force)]
     if not keep_floor:
         choices = say_ground(site.ground, floors, remove_floors(spec, floors)) + choices
-    notes = [*felt.doubts, *doubts.gravity_doubts(draft.model, bed_sand)]
-    notes += reading_doubts(draft.model, [draft.model.body(body).id for body in felt.surfaces])
+    notes = [*felt.doubts, *doubts.gravity_doubts(draft.model, bed_sand), *_doubts(draft.model, numbers, felt, floors)]
     notes += floor_doubts(floors) if keep_floor else []
-    notes += _standing_doubts(draft.model, numbers, felt, floors)
     _tell(choices, notes)
     return Bed(
         name, bed_sand, bed_law, site.terrain, felt.surfaces, felt.reasons, tuple(choices), tuple(notes), economies
@@ -208,11 +206,12 @@ def _integrate(spec: mujoco.MjSpec, force: str) -> list[str]:
     return ["the integrator is implicitfast now: RK4 would take the sand's force at the velocity of the moment"]
 
 
-def _standing_doubts(model: mujoco.MjModel, bed: Array, felt: Felt, floors: Floors) -> list[str]:
-    """The doubts that show when the model stands in its sand."""
+def _doubts(model: mujoco.MjModel, bed: Array, felt: Felt, floors: Floors) -> list[str]:
+    """The doubts about sensors of felt bodies, and those that show when the model stands in its sand."""
     packed = {model.body(name).id: layout.pack_surface(surface) for name, surface in felt.surfaces.items()}
     found = stand(model, start(model), bed, packed)
     return [
+        *reading_doubts(model, packed),
         *doubts.sinkage_doubts(model, found, felt.surfaces),
         *doubts.footprint_doubts(model, found, floors.terrain),
         *carrying(model, found.qpos, floors),

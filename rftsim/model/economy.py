@@ -24,10 +24,13 @@ def economise(model: mujoco.MjModel, felt: Felt, bed: Array, tolerance: float) -
     Returns:
         The numbers of each surface before and after, by body name.
     """
-    economies, memory = {}, Memory(user_folder())
-    for name, surface in felt.surfaces.items():
-        reach = functools.cache(functools.partial(sampled_reach, model, model.body(name).id, surface))
-        felt.surfaces[name], economies[name] = memory.reduced(surface, bed, tolerance, reach)
+    names, economies = list(felt.surfaces), {}
+    bodies = [
+        (surface, functools.cache(functools.partial(sampled_reach, model, model.body(name).id, surface)))
+        for name, surface in felt.surfaces.items()
+    ]
+    for name, found in zip(names, Memory(user_folder()).all_reduced(bodies, bed, tolerance), strict=True):
+        felt.surfaces[name], economies[name] = found
         felt.reasons[name] += f"; {_said(economies[name], tolerance)}"
     return economies
 

@@ -14,8 +14,8 @@ from rftsim.sand.free_surface import FreeSurface
 from rftsim.surface.triangles import Array
 
 _GEOM = mujoco.mjtGeom
-FLUSH: Final = 2e-3
-"""Distance from the sand's surface within which a face counts as part of it [m]."""
+FLUSH: Final = 0.02
+"""Distance from the sand's surface, over the reach, within which a face counts as part of it."""
 FEW: Final = 3
 """Names that a line tells before it counts the others."""
 
@@ -36,6 +36,8 @@ class Floors(NamedTuple):
 
     terrain: FreeSurface
     """The sand's surface."""
+    flush: float
+    """Distance from it within which a face counts as part of it [m]."""
     depths: dict[str, float]
     """Depth below the sand's surface of those that collide [m]."""
     drawn: list[str]
@@ -45,7 +47,8 @@ class Floors(NamedTuple):
 def find_ground(model: mujoco.MjModel) -> Ground | None:
     """Find the geom that a model's heaviest tree stands on at the start: the highest top below its centre of mass.
 
-    Trees that can fall count first, and then those whose base is fixed; where nothing lies below, the nearest above.
+    Trees that can fall count first, and then those whose base is fixed. What is narrower than the tree carries it only
+    where nothing else does, and what lies above only where nothing lies below.
     """
     data = start(model)
     candidates = _static(model, can_touch(model))
@@ -55,9 +58,22 @@ def find_ground(model: mujoco.MjModel) -> Ground | None:
         tops = {geom: top for geom in candidates if (top := top_at(model, data, geom, place)) is not None}
         if tops:
             below = {geom: top for geom, top in tops.items() if top.height <= place[2]}
-            geom = max(below, key=lambda g: below[g].height) if below else min(tops, key=lambda g: tops[g].height)
+            wide = {geom: top for geom, top in below.items() if _radius(model, geom) >= _spread(model, data, root)}
+            under = wide or below
+            geom = max(under, key=lambda g: under[g].height) if under else min(tops, key=lambda g: tops[g].height)
             return Ground(geom, _plane(tops[geom], place), relief(model, geom))
     return None
+
+
+def _radius(model: mujoco.MjModel, geom: int) -> float:
+    """Radius of the ball around a geom [m], infinite of planes."""
+    return float(model.geom_rbound[geom]) or np.inf
+
+
+def _spread(model: mujoco.MjModel, data: mujoco.MjData, root: int) -> float:
+    """How far the geoms of a tree lie from its centre of mass, along the level [m]."""
+    own = data.geom_xpos[model.body_rootid[model.geom_bodyid] == model.body_rootid[root]]
+    return float(np.linalg.norm(own[:, :2] - data.subtree_com[root][:2], axis=1).max(initial=0.0))
 
 
 def _plane(top: Top, place: Array) -> FreeSurface:
@@ -102,7 +118,7 @@ def find_floors(model: mujoco.MjModel, terrain: FreeSurface, reach: float) -> Fl
     trees = standing_trees(model)
     place = data.subtree_com[trees[0]] if trees else np.zeros(3)
     endless = (_GEOM.mjGEOM_PLANE, _GEOM.mjGEOM_HFIELD)
-    collides, depths, drawn = colliding(model), {}, []
+    collides, flush, depths, drawn = colliding(model), FLUSH * reach, {}, []
     for geom in _static(model, np.ones(model.ngeom, dtype=bool)):
         kind, name = _GEOM(model.geom_type[geom]), model.geom(geom).name
         at = place if kind == _GEOM.mjGEOM_PLANE else data.geom_xpos[geom]
@@ -110,11 +126,11 @@ def find_floors(model: mujoco.MjModel, terrain: FreeSurface, reach: float) -> Fl
         if top is None:
             continue
         depth = float(terrain.depth([at[0], at[1], top.height]))
-        if collides[geom] and abs(depth) <= reach and (kind in endless or depth >= -FLUSH):
+        if collides[geom] and abs(depth) <= reach and (kind in endless or depth >= -flush):
             depths[name] = depth
-        elif not collides[geom] and abs(depth) <= FLUSH and top.normal @ terrain.normal > 1.0 - 1e-6:
+        elif not collides[geom] and abs(depth) <= flush and top.normal @ terrain.normal > 1.0 - 1e-6:
             drawn.append(name)
-    return Floors(terrain, depths, drawn)
+    return Floors(terrain, flush, depths, drawn)
 
 
 def remove_floors(spec: mujoco.MjSpec, floors: Floors) -> int:
@@ -134,13 +150,13 @@ def say_ground(ground: Ground | None, floors: Floors, pairs: int) -> list[str]:
     if not floors.depths:
         return []
     terrain = floors.terrain
-    more = f", nor do its {pairs} contact pairs" if pairs else ""
+    many = len(floors.depths) > 1
+    gone = "which no longer collide and are hidden" if many else "which no longer collides and is hidden"
+    more = f", nor {'do' if pairs > 1 else 'does'} {pairs} contact pair{'s' if pairs > 1 else ''}" if pairs else ""
     tilt = f", tilted by {np.degrees(np.arccos(terrain.normal[2])):.3g} degrees" if terrain.normal[2] < 1.0 else ""
     flat = f", flat although that has {ground.relief:.3g} m of relief" if ground is not None and ground.relief else ""
-    return [
-        f"the sand lies at z = {terrain.height:.6g} m{tilt}{flat}, in the place of {_list(floors.depths)}, which no "
-        f"longer collides and is hidden{more} (keep_floor=True keeps it)"
-    ]
+    place = f"the sand lies at z = {terrain.height:.6g} m{tilt}{flat}, in the place of {_list(floors.depths)}"
+    return [f"{place}, {gone}{more} (keep_floor=True keeps {'them' if many else 'it'})"]
 
 
 def floor_doubts(floors: Floors) -> list[str]:
@@ -180,7 +196,7 @@ def carrying(model: mujoco.MjModel, qpos: Array, floors: Floors) -> list[str]:
         if len(pair & static) != 1 or pair & set(gone) or abs(contact.frame[:3] @ terrain.normal) < LEVEL:
             continue
         (geom,), (other,) = pair & static, pair - static
-        if model.body_weldid[model.geom_bodyid[other]] != 0 and terrain.depth(contact.pos) >= -FLUSH:
+        if model.body_weldid[model.geom_bodyid[other]] != 0 and terrain.depth(contact.pos) >= -floors.flush:
             found[model.geom(geom).name] = model.body(model.geom_bodyid[other]).name
     if not found:
         return []

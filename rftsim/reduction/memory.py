@@ -5,6 +5,7 @@ that these depend on: triangles, sand, tolerance, reach, and the code that searc
 user or does not fit the surface is made anew; where nothing can be written, nothing is.
 """
 
+import concurrent.futures
 import contextlib
 import functools
 import hashlib
@@ -13,7 +14,7 @@ import stat
 import sys
 import zipfile
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -23,6 +24,7 @@ from rftsim.errors import RftsimError
 from rftsim.files import replacing
 from rftsim.law.layout import BLOCK
 from rftsim.machine.sources import PACKAGE, SOURCE
+from rftsim.reduction.facets import Labels
 from rftsim.reduction.reduce import SEEDS, Economy, Partition, partition, put_together
 from rftsim.reduction.samples import Reach, free_reach
 from rftsim.reduction.twins import counterparts
@@ -45,43 +47,69 @@ class Memory:
     def __init__(self, folder: Path | None) -> None:
         self.folder = folder
         self.known: dict[str, Partition] = {}
-        self.free: list[tuple[Surface, bytes, Partition]] = []
-        """Surfaces of free bodies in blocks, sand and tolerance, and what was found."""
+        self.wanted: dict[str, Callable[[], Partition]] = {}
+        """The searches that are still to be made."""
+        self.images: dict[str, tuple[str, Labels]] = {}
+        """Of the reductions that are those of another's mirror image: whose, and which triangle each is there."""
+        self.free: list[tuple[Surface, bytes, str]] = []
+        """Surfaces of free bodies in blocks, sand and tolerance, and the name of their reduction."""
 
     def reduced(
         self, surface: Surface, bed: Array, tolerance: float, reach: Callable[[int], Reach] = free_reach
     ) -> tuple[Surface, Economy]:
         """The surface in the fewest facets found, from memory where it is known; arguments as of `reduce.reduced`."""
+        return self.all_reduced([(surface, reach)], bed, tolerance)[0]
+
+    def all_reduced(
+        self, bodies: Sequence[tuple[Surface, Callable[[int], Reach]]], bed: Array, tolerance: float
+    ) -> list[tuple[Surface, Economy]]:
+        """The same of several bodies under one sand, whose searches run side by side; pairs of surface and reach."""
+        names = [self._look_up(surface, bed, tolerance, reach) for surface, reach in bodies]
+        self._search()
+        return [put_together(surface, self.known[name]) for (surface, _), name in zip(bodies, names, strict=True)]
+
+    def _look_up(self, surface: Surface, bed: Array, tolerance: float, reach: Callable[[int], Reach]) -> str:
+        """The name of a reduction, which is known then, or an image of another, or wanted."""
         reaches = [reach(seed) for seed in SEEDS]
         name = _name(surface, bed, tolerance, reaches)
-        if name not in self.known:
-            search = functools.partial(partition, surface, bed, tolerance, reach)
-            if _is_free(reaches) and surface.wheel is None:
-                search = functools.partial(self._searched, surface, bed, tolerance)
-            self.known[name] = self._kept(name, surface, search)
-        return put_together(surface, self.known[name])
+        if name in self.known or name in self.wanted or name in self.images:
+            return name
+        found = _read(self._path(name), surface.ntri) if self.folder else None
+        if found is not None:
+            self.known[name] = found
+        elif not (_is_free(reaches) and surface.wheel is None):
+            self.wanted[name] = functools.partial(partition, surface, bed, tolerance, reach)
+        elif not self._is_image(name, surface.clustered(BLOCK), bed.tobytes() + repr(tolerance).encode()):
+            self.wanted[name] = functools.partial(partition, surface, bed, tolerance, free_reach)
+        return name
 
-    def _searched(self, surface: Surface, bed: Array, tolerance: float) -> Partition:
-        """The reduction of a free body, by a search or from that of its image."""
-        blocks, conditions = surface.clustered(BLOCK), bed.tobytes() + repr(tolerance).encode()
-        for other, under, found in self.free:
+    def _is_image(self, name: str, blocks: Surface, conditions: bytes) -> bool:
+        """Whether a free body is the mirror image of one before it, under the same conditions."""
+        for other, under, whose in self.free:
             image = counterparts(blocks, other) if under == conditions else None
             if image is not None:
-                return found._replace(labels=found.labels[image])
-        found = partition(surface, bed, tolerance, free_reach)
-        self.free.append((blocks, conditions, found))
-        return found
+                self.images[name] = whose, image
+                return True
+        self.free.append((blocks, conditions, name))
+        return False
 
-    def _kept(self, name: str, surface: Surface, search: Callable[[], Partition]) -> Partition:
-        """The reduction of that name from the folder, or by a search now, which is then kept there."""
-        path = self.folder / f"{name}.npz" if self.folder else None
-        found = _read(path, surface.ntri) if path else None
-        if found is None:
-            found = search()
-            if path is not None:
+    def _search(self) -> None:
+        """Make the wanted searches, and keep what they find."""
+        with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
+            fresh = dict(zip(self.wanted, pool.map(lambda search: search(), self.wanted.values()), strict=True))
+        self.known |= fresh
+        for name, (whose, image) in self.images.items():
+            fresh[name] = self.known[whose]._replace(labels=self.known[whose].labels[image])
+        self.known |= fresh
+        self.wanted, self.images = {}, {}
+        if self.folder:
+            for name, found in fresh.items():
                 with contextlib.suppress(OSError, RftsimError):  # a folder that cannot be written keeps nothing
-                    _write(path, found)
-        return found
+                    _write(self._path(name), found)
+
+    def _path(self, name: str) -> Path:
+        assert self.folder is not None
+        return self.folder / f"{name}.npz"
 
 
 def user_folder() -> Path | None:

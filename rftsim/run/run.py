@@ -185,14 +185,15 @@ def _unsolved(model: mujoco.MjModel, data: mujoco.MjData) -> list[str]:
 
 
 def _worst(checks: list[Validity]) -> list[str]:
-    """The doubts about each body at its worst moments."""
+    """The doubts about the bodies at their worst moments, one of each kind: that of the body of which it is truest."""
+    kinds: dict[str, dict[str, tuple[float, str]]] = {}
+    for check in checks:
+        for kind, value, sentence in check.doubts():
+            own = kinds.setdefault(kind, {})
+            own[check.body] = max(own.get(check.body, (0.0, "")), (value, sentence))
     found = []
-    for name in dict.fromkeys(check.body for check in checks):
-        own = [check for check in checks if check.body == name]
-        worst = own[0]._replace(
-            froude=max(check.froude for check in own),
-            inertial=max((check.inertial for check in own if check.inertial == check.inertial), default=float("nan")),
-            depth=max(check.depth for check in own),
-        )
-        found += worst.doubts()
+    for bodies in kinds.values():
+        name = max(bodies, key=lambda body: bodies[body][0])
+        more = f" (and {len(bodies) - 1} more)" if len(bodies) > 1 else ""
+        found.append(f"body {name}{more}: {bodies[name][1]}")
     return found

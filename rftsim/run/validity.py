@@ -33,16 +33,19 @@ class Validity(NamedTuple):
     dynamic: bool
     """Whether the law has inertial terms."""
 
-    def doubts(self) -> list[str]:
-        """Sentences that say what of the body is out of range, with numbers."""
+    def doubts(self) -> list[tuple[str, float, str]]:
+        """Each number that is out of range: its name, its value, and a sentence that says so."""
         found = []
         if self.froude > FROUDE_LIMIT and not self.dynamic:
-            found.append(f"Froude number {self.froude:.2g} > {FROUDE_LIMIT}: use a dynamic law")
+            said = f"Froude number {self.froude:.2g} > {FROUDE_LIMIT}: use a dynamic law"
+            found.append(("froude", self.froude, said))
         if self.inertial > INERTIAL_LIMIT:
-            found.append(f"inertial number {self.inertial:.2g} > {INERTIAL_LIMIT}: grains no longer flow densely")
+            said = f"inertial number {self.inertial:.2g} > {INERTIAL_LIMIT}: grains no longer flow densely"
+            found.append(("inertial", self.inertial, said))
         if self.depth > DEPTH_LIMIT:
-            found.append(f"depth is {self.depth:.2g} times the size, more than {DEPTH_LIMIT:g}: stress overestimated")
-        return [f"body {self.body}: {doubt}" for doubt in found]
+            said = f"depth is {self.depth:.2g} times the size, more than {DEPTH_LIMIT:g}: stress overestimated"
+            found.append(("depth", self.depth, said))
+        return found
 
 
 def validity(model: mujoco.MjModel, data: mujoco.MjData, grain_diameter: float | None = None) -> list[Validity]:

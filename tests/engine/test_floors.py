@@ -87,7 +87,7 @@ def test_contact_pairs_go_too():
     bed, data, carried = settled(floor + free + other, extra=f"<contact>{pairs}</contact>")
     assert carried == pytest.approx(1.0, abs=0.01)
     assert data.ncon == 0
-    assert "nor do its 2 contact pairs" in bed.choices[0]
+    assert "nor do 2 contact pairs" in bed.choices[0]
 
 
 def test_walls_stay():
@@ -128,6 +128,15 @@ def test_tiles_at_one_height_are_all_floor():
     collides = {model.geom(i).name for i in range(model.ngeom) if model.geom_contype[i]}
     assert collides == {"tile2", "sole"}
     assert "geom tile0, geom tile1, geom tile3 and 1 more" in choice
+
+
+def test_a_mark_on_the_floor_is_no_floor():
+    """A disc of 4 mm, narrower than the robot above it: the sand lies at the floor's height, and the disc goes too."""
+    wide = FOOT.replace("</body>", '<geom size=".05" pos=".2 0 0"/><geom size=".05" pos="-.2 0 0"/></body>')
+    spec = spec_of(FLOOR + '<geom name="mark" type="cylinder" size=".05 .002" pos="0 0 .002"/>' + wide)
+    bed = add_sand(spec, SAND)
+    assert bed.terrain.height == 0.0
+    assert "geom floor, geom mark, which no longer collide and are hidden" in bed.choices[0]
 
 
 def test_keeping_the_floor_is_warned_of():
