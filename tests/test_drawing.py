@@ -132,7 +132,7 @@ def test_the_sand_is_found_under_a_prefix():
 def test_the_block_of_sand_has_its_upper_face_on_the_surface():
     """On a slope and far away, moved by whole periods of the texture along the surface."""
     terrain = rftsim.FreeSurface(0.3, (-0.2, 0.1, 1.0))
-    model = rftsim.load(SCENE, disable_floor=True, terrain=terrain)
+    model = rftsim.load(SCENE, terrain=terrain)
     data, scene = mujoco.MjData(model), mujoco.MjvScene(model, maxgeom=100)
     mujoco.mj_forward(model, data)
     camera, option = mujoco.MjvCamera(), mujoco.MjvOption()

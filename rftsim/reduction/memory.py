@@ -95,8 +95,7 @@ class Memory:
 
     def _search(self) -> None:
         """Make the wanted searches, and keep what they find."""
-        with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
-            fresh = dict(zip(self.wanted, pool.map(lambda search: search(), self.wanted.values()), strict=True))
+        fresh = _side_by_side(self.wanted)
         self.known |= fresh
         for name, (whose, image) in self.images.items():
             fresh[name] = self.known[whose]._replace(labels=self.known[whose].labels[image])
@@ -110,6 +109,17 @@ class Memory:
     def _path(self, name: str) -> Path:
         assert self.folder is not None
         return self.folder / f"{name}.npz"
+
+
+def _side_by_side(searches: dict[str, Callable[[], Partition]]) -> dict[str, Partition]:
+    """The results of searches by their names, as many at once as there are processors."""
+    if not searches:
+        return {}
+    import threadpoolctl  # not where all is known
+
+    one_each = threadpoolctl.threadpool_limits(1, "blas")  # whose threads would wait for one another's processors
+    with one_each, concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
+        return dict(zip(searches, pool.map(lambda search: search(), searches.values()), strict=True))
 
 
 def user_folder() -> Path | None:
