@@ -154,8 +154,8 @@ def _brief(row: dict[str, Any]) -> str:
 
 
 def stands(row: dict[str, Any]) -> bool:
-    """Whether a model came to rest with a weight that something has to carry."""
-    return row.get("carried") is not None and row["speed"] < REST
+    """Whether a model came to rest in the sand with a weight that nothing else carries at all."""
+    return bool(row.get("carried")) and row["speed"] < REST
 
 
 def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:

@@ -24,6 +24,8 @@ def gravity_doubts(model: mujoco.MjModel, sand: Sand) -> list[str]:
     gravity = float(np.linalg.norm(model.opt.gravity))
     if abs(gravity - sand.g) <= 0.02 * sand.g:
         return []
+    if gravity == 0.0:
+        return [f"the model has no gravity: nothing lies on the sand, whose strength is that under {sand.g:.3g} m/s^2"]
     for factor, unit in _UNITS.items():
         if abs(gravity - 9.81 * factor) <= 0.02 * gravity:
             return [

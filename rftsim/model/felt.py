@@ -9,7 +9,7 @@ import numpy as np
 
 from rftsim.errors import SceneError
 from rftsim.law import layout
-from rftsim.model.geometry import bounding_geoms
+from rftsim.model.geometry import bounding_geoms, colliding
 from rftsim.model.reach import clearance, stays_in_plane
 from rftsim.model.shaping import Fineness, Shaping, shape
 from rftsim.sand.free_surface import FreeSurface
@@ -56,6 +56,10 @@ def felt_bodies(model: mujoco.MjModel, choice: Choice) -> Felt:
     """
     names = [model.body(i).name for i in range(model.nbody)]
     _check_chosen(choice.bodies or frozenset(), names)
+    if choice.fineness.geoms == "collision" and not _any_collides(model):
+        felt = felt_bodies(model, choice._replace(fineness=choice.fineness._replace(geoms="all")))
+        felt.choices.append("no geom of a body that moves collides, so that all of them are felt")
+        return felt
     unfit = {body: _unfit(model, body, names[body], choice) for body in range(1, model.nbody)}
     shaping = shape(model, [body for body, why in unfit.items() if not why], choice.fineness)
     felt = Felt({}, {}, shaping.choices, shaping.doubts)
@@ -65,12 +69,20 @@ def felt_bodies(model: mujoco.MjModel, choice: Choice) -> Felt:
             felt.surfaces[names[body]] = surface.clustered(layout.BLOCK)
         elif choice.bodies is not None and names[body] in choice.bodies:
             raise SceneError(f"body {names[body]!r} cannot feel the sand: it {felt.reasons[names[body]]}")
+    if not felt.surfaces and choice.terrain is not None and shaping.surfaces:
+        felt = felt_bodies(model, choice._replace(terrain=None))
+        felt.doubts.append("no body can come down to the sand, as its joints go: put the sand higher (terrain=)")
     if not felt.surfaces:
         raise SceneError(
             f"no body would feel the sand ({_said(felt.reasons)}). Bodies need geoms that collide, or geoms='all'; "
             '<compiler discardvisual="true"/> deletes the others'
         )
     return felt
+
+
+def _any_collides(model: mujoco.MjModel) -> bool:
+    """Whether a geom that moves can collide with anything."""
+    return bool((colliding(model) & (model.body_weldid[model.geom_bodyid] != 0)).any())
 
 
 def _said(reasons: dict[str, str]) -> str:
@@ -105,7 +117,7 @@ def _felt_surface(model: mujoco.MjModel, body: int, shaping: Shaping, choice: Ch
     """The part of a body's surface that feels the sand, None where nothing does, and why."""
     surface = shaping.surfaces.get(body)
     if surface is None:
-        return None, "lies inside bodies that it is fixed to"
+        return None, "lies inside bodies that it is fixed to, or has no geom with a surface"
     if choice.terrain is not None:
         above = clearance(model, body, surface, choice.terrain)
         if above > CLEAR * surface.size:

@@ -7,8 +7,8 @@ from typing import Any, Final, NamedTuple
 
 import mujoco
 
-from rftsim.errors import SurfaceError
-from rftsim.model.geometry import LARGER, Geoms, Meshes, Part, bounding_geoms, colliding, geom_part
+from rftsim.errors import RftsimError, SurfaceError
+from rftsim.model.geometry import LARGER, Geoms, Meshes, Part, bounding_geoms, colliding, geom_label, geom_part
 from rftsim.surface.triangles import Array, Surface, joined
 from rftsim.surface.union import overlapping, united
 
@@ -60,18 +60,10 @@ def shape(model: mujoco.MjModel, bodies: Iterable[int], fineness: Fineness) -> S
         bodies: Ids of the bodies.
         fineness: Geoms, meshes and edges.
 
-    Raises:
-        SurfaceError: A mesh does not bound a body, nor does its hull.
-        SceneError: A geom has no surface that the sand could press on.
+    A geom without a surface that the sand could press on, as a flat mesh, is left out and said.
     """
-    can_collide, chosen = colliding(model), list(bodies)
-    parts = {
-        body: [
-            geom_part(model, geom, fineness.meshes == "hull" and bool(can_collide[geom]))
-            for geom in bounding_geoms(model, body, fineness.geoms)
-        ]
-        for body in chosen
-    }
+    chosen, empty = list(bodies), []
+    parts: dict[int, list[Part]] = {body: _parts(model, body, fineness, empty) for body in chosen}
     surfaces, unions = {}, {}
     for rigid, members in itertools.groupby(sorted(chosen, key=lambda b: model.body_weldid[b]), model.body_weldid.item):
         group = [body for body in members if parts[body]]
@@ -91,8 +83,23 @@ def shape(model: mujoco.MjModel, bodies: Iterable[int], fineness: Fineness) -> S
     return Shaping(
         ordered,
         [*_say_hulls(model, hulls, fineness.meshes), *_say_unions(unions, names)],
-        [*_one_a_kind([note for surface in ordered.values() for note in surface.notes]), *_troubles(unions, names)],
+        [
+            *_one_a_kind(empty),
+            *_one_a_kind([note for surface in ordered.values() for note in surface.notes]),
+            *_troubles(unions, names),
+        ],
     )
+
+
+def _parts(model: mujoco.MjModel, body: int, fineness: Fineness, empty: list[str]) -> list[Part]:
+    """The surfaces of the geoms that bound a body; `empty` takes sentences about those that have none."""
+    can_collide, found = colliding(model), []
+    for geom in bounding_geoms(model, body, fineness.geoms):
+        try:
+            found.append(geom_part(model, geom, fineness.meshes == "hull" and bool(can_collide[geom])))
+        except RftsimError as error:
+            empty.append(f"{geom_label(model, geom)} (left out): {error}")
+    return found
 
 
 def body_surface(model: mujoco.MjModel, body: int, fineness: Fineness) -> Surface | None:

@@ -14,7 +14,7 @@ from rftsim_models import hexapod, wheels
 from trees import SAND, spec_of, xml
 
 import rftsim
-from rftsim import FreeSurface, SceneError, add_sand
+from rftsim import FreeSurface, RftsimWarning, SceneError, add_sand
 from rftsim.law.laws import get_law
 from rftsim.law.layout import pack_bed
 from rftsim.model.add_sand import read_spec
@@ -100,10 +100,11 @@ def test_a_tolerance_leaves_out_what_cannot_reach_the_sand():
     assert set(add_sand(spec_of(CRANE), SAND, tolerance=0.2, bodies=["lift"]).surfaces) == {"lift"}
 
 
-def test_nothing_within_reach_is_an_error():
-    """The error says why no body would feel the sand."""
-    with pytest.raises(SceneError, match=r"stays 1.9 m or more above"):
-        add_sand(spec_of('<body pos="0 0 2"><joint axis="0 0 1"/><geom size=".1"/></body>'), SAND, tolerance=0.1)
+def test_nothing_within_reach_is_said():
+    """A model of which nothing can come down to the sand loads all the same, and says so."""
+    with pytest.warns(RftsimWarning, match="no body can come down to the sand"):
+        bed = add_sand(spec_of('<body name="b" pos="0 0 2"><joint axis="0 0 1"/><geom size=".1"/></body>'), SAND)
+    assert list(bed.surfaces) == ["b"]
 
 
 @pytest.mark.parametrize("tolerance", [-0.1, 1.0, np.nan])

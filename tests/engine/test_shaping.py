@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from trees import SAND, spec_of
 
-from rftsim import RftsimNote, RftsimWarning, SurfaceError, add_sand, surface_force
+from rftsim import RftsimNote, RftsimWarning, SceneError, SurfaceError, add_sand, surface_force
 from rftsim.surface import solids
 from rftsim.surface.triangles import Surface, make_surface
 from rftsim.surface.union import overlapping, united
@@ -64,13 +64,22 @@ def test_open_meshes_are_their_hulls(meshes):
     assert len(bed.choices) == 1
 
 
-def test_flat_meshes_are_refused():
-    """A mesh without a thickness has no hull; the error names it and the remedy."""
+def test_flat_meshes_are_left_out():
+    """A mesh without a thickness has no hull: it is left out and said, with its remedy; alone, it is an error."""
     plate = "0 0 0 1 0 0 0 1 0 1 1 0"
     asset = f'<asset><mesh name="flat" vertex="{plate}" face="0 1 2 1 3 2" inertia="shell"/></asset>'
-    body = '<body name="b"><freejoint/><geom type="mesh" mesh="flat" mass="1" contype="0" conaffinity="0"/></body>'
-    with pytest.raises(SurfaceError, match="mesh flat is flat"):
-        bed_of(body, asset, geoms="all")
+    flat = '<geom type="mesh" mesh="flat" mass="1" contype="0" conaffinity="0"/>'
+    with pytest.warns(RftsimWarning, match="left out.*mesh flat is flat.*thickness"):
+        assert bed_of(f'<body name="b"><freejoint/>{flat}<geom size=".1" contype="0" conaffinity="0"/></body>', asset)
+    with pytest.raises(SceneError, match="no body would feel the sand"):
+        bed_of(f'<body name="b"><freejoint/>{flat}</body>', asset)
+
+
+def test_a_model_of_which_nothing_collides():
+    """As gymnasium's Swimmer: what is seen is felt, and a line says so."""
+    bed = bed_of('<body name="b"><freejoint/><geom size=".1" contype="0" conaffinity="0"/></body>')
+    assert list(bed.surfaces) == ["b"]
+    assert "no geom of a body that moves collides" in bed.choices[-1]
 
 
 def test_one_line_for_many_meshes():
