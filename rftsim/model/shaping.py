@@ -62,7 +62,8 @@ def shape(model: mujoco.MjModel, bodies: Iterable[int], fineness: Fineness) -> S
 
     A geom without a surface that the sand could press on, as a flat mesh, is left out and said.
     """
-    chosen, empty = list(bodies), []
+    chosen: list[int] = list(bodies)
+    empty: list[str] = []
     parts: dict[int, list[Part]] = {body: _parts(model, body, fineness, empty) for body in chosen}
     surfaces, unions = {}, {}
     for rigid, members in itertools.groupby(sorted(chosen, key=lambda b: model.body_weldid[b]), model.body_weldid.item):

@@ -5,6 +5,7 @@ from typing import Final, NamedTuple
 import mujoco
 import numpy as np
 
+from rftsim.errors import SurfaceError
 from rftsim.model.geometry import hull_triangles
 from rftsim.surface.triangles import Array
 
@@ -39,7 +40,10 @@ def top_at(model: mujoco.MjModel, data: mujoco.MjData, geom: int, place: Array) 
     rotation, origin = data.geom_xmat[geom].reshape(3, 3), data.geom_xpos[geom]
     if kind == _GEOM.mjGEOM_HFIELD:
         return _field_top(model, geom, rotation, origin, place)
-    normals, offsets = _halfspaces(model, geom, kind)
+    try:
+        normals, offsets = _halfspaces(model, geom, kind)
+    except SurfaceError:  # a flat mesh, which carries nothing in MuJoCo
+        return None
     normals, offsets = normals @ rotation.T, offsets + normals @ rotation.T @ origin
     return _upper(normals, offsets, place)
 
