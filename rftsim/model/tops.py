@@ -10,8 +10,8 @@ from rftsim.model.geometry import hull_triangles
 from rftsim.surface.triangles import Array
 
 _GEOM = mujoco.mjtGeom
-LEVEL: Final = 0.5
-"""Cosine of the tilt from which on a face is a wall and carries nothing."""
+LEVEL: Final = 0.82
+"""Cosine of the tilt from which on a face is a wall: 35 degrees, about the steepest that sand lies."""
 FLAT: Final = (_GEOM.mjGEOM_PLANE, _GEOM.mjGEOM_BOX, _GEOM.mjGEOM_CYLINDER, _GEOM.mjGEOM_MESH, _GEOM.mjGEOM_HFIELD)
 """Kinds of geoms that have a top to stand on; round ones are obstacles."""
 

@@ -90,6 +90,15 @@ def test_contact_pairs_go_too():
     assert "nor do 2 contact pairs" in bed.choices[0]
 
 
+def test_steep_walls_are_no_floors():
+    """A funnel of planes at 45 degrees over a floor, as dm_control's stacker has: the floor becomes sand, they stay."""
+    slope = '<geom name="slope" type="plane" size="5 5 .1" pos=".4 0 0" zaxis="-1 0 1"/>'
+    bed, _, carried = settled(FLOOR + slope + FOOT)
+    assert bed.terrain == FreeSurface()
+    assert "slope" not in bed.choices[0]
+    assert carried == pytest.approx(1.0, abs=0.01)
+
+
 def test_walls_stay():
     """A plane that stands upright holds a box that flies at it at 20 m/s, and is no floor."""
     spec = spec_of(FLOOR + WALL + FOOT.replace("0 0 .3", "1 0 2"))
