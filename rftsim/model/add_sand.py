@@ -159,6 +159,8 @@ def add_sand(
         check_sensors(spec, felt.surfaces)
     if draw:
         check_drawing(spec, name)
+    notes = [*felt.doubts, *doubts.gravity_doubts(draft.model, bed_sand), *_doubts(draft.model, numbers, felt, floors)]
+    notes += floor_doubts(floors) if keep_floor else []
 
     name_bodies(spec, draft)
     carrier = Carrier(name, plugin.IMPLICIT if force == "implicit" else plugin.EXPLICIT)
@@ -170,8 +172,6 @@ def add_sand(
     choices = [*felt.choices, *_integrate(spec, force)]
     if not keep_floor:
         choices = say_ground(site.ground, floors, remove_floors(spec, floors)) + choices
-    notes = [*felt.doubts, *doubts.gravity_doubts(draft.model, bed_sand), *_doubts(draft.model, numbers, felt, floors)]
-    notes += floor_doubts(floors) if keep_floor else []
     _tell(choices, notes)
     return Bed(
         name, bed_sand, bed_law, site.terrain, felt.surfaces, felt.reasons, tuple(choices), tuple(notes), economies

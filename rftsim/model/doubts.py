@@ -6,7 +6,7 @@ from typing import Final
 import mujoco
 import numpy as np
 
-from rftsim.model.geometry import colliding, geom_triangles
+from rftsim.model.geometry import colliding, geom_triangles, own_geoms
 from rftsim.model.standing import Foot, Standing
 from rftsim.sand.free_surface import FreeSurface
 from rftsim.sand.medium import Sand
@@ -82,8 +82,8 @@ def footprint_doubts(model: mujoco.MjModel, found: Standing, terrain: FreeSurfac
 
 def _footprint(model: mujoco.MjModel, data: mujoco.MjData, body: int, collides: bool, terrain: FreeSurface) -> float:
     """Area of the outline, from above, of the lower part of a body's geoms that collide, or of the others [m^2]."""
-    can, own = colliding(model), range(model.body_geomadr[body], model.body_geomadr[body] + model.body_geomnum[body])
-    corners = [_placed(model, data, geom) for geom in own if bool(can[geom]) == collides]
+    can = colliding(model)
+    corners = [_placed(model, data, geom) for geom in own_geoms(model, body) if bool(can[geom]) == collides]
     if not corners:
         return 0.0
     depths = [terrain.depth(points) for points in corners]

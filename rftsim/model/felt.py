@@ -56,28 +56,39 @@ def felt_bodies(model: mujoco.MjModel, choice: Choice) -> Felt:
     """
     names = [model.body(i).name for i in range(model.nbody)]
     _check_chosen(choice.bodies or frozenset(), names)
+    told = []
     if choice.fineness.geoms == "collision" and not _any_collides(model):
-        felt = felt_bodies(model, choice._replace(fineness=choice.fineness._replace(geoms="all")))
-        felt.choices.append("no geom of a body that moves collides, so that all of them are felt")
-        return felt
+        choice = choice._replace(fineness=choice.fineness._replace(geoms="all"))
+        told = ["no geom of a body that moves collides, so that all of them are felt"]
     unfit = {body: _unfit(model, body, names[body], choice) for body in range(1, model.nbody)}
     shaping = shape(model, [body for body, why in unfit.items() if not why], choice.fineness)
-    felt = Felt({}, {}, shaping.choices, shaping.doubts)
-    for body, why in unfit.items():
-        surface, felt.reasons[names[body]] = (None, why) if why else _felt_surface(model, body, shaping, choice)
-        if surface is not None:
-            felt.surfaces[names[body]] = surface.clustered(layout.BLOCK)
-        elif choice.bodies is not None and names[body] in choice.bodies:
-            raise SceneError(f"body {names[body]!r} cannot feel the sand: it {felt.reasons[names[body]]}")
+    surfaces, reasons = _within_reach(model, unfit, shaping, choice)
+    felt = Felt(surfaces, reasons, [*shaping.choices, *told], shaping.doubts)
     if not felt.surfaces and choice.terrain is not None and shaping.surfaces:
-        felt = felt_bodies(model, choice._replace(terrain=None))
-        felt.doubts.append("no body can come down to the sand, as its joints go: put the sand higher (terrain=)")
+        surfaces, reasons = _within_reach(model, unfit, shaping, choice._replace(terrain=None))
+        doubt = "no body can come down to the sand, as its joints go: put the sand higher (terrain=)"
+        felt = Felt(surfaces, reasons, felt.choices, [*felt.doubts, doubt])
     if not felt.surfaces:
         raise SceneError(
             f"no body would feel the sand ({_said(felt.reasons)}). Bodies need geoms that collide, or geoms='all'; "
             '<compiler discardvisual="true"/> deletes the others'
         )
     return felt
+
+
+def _within_reach(
+    model: mujoco.MjModel, unfit: dict[int, str], shaping: Shaping, choice: Choice
+) -> tuple[dict[str, Surface], dict[str, str]]:
+    """Surfaces of the bodies that feel the sand, in blocks, and the reasons for all, by body name."""
+    surfaces, reasons = {}, {}
+    for body, why in unfit.items():
+        name = model.body(body).name
+        surface, reasons[name] = (None, why) if why else _felt_surface(model, body, shaping, choice)
+        if surface is not None:
+            surfaces[name] = surface.clustered(layout.BLOCK)
+        elif choice.bodies is not None and name in choice.bodies:
+            raise SceneError(f"body {name!r} cannot feel the sand: it {reasons[name]}")
+    return surfaces, reasons
 
 
 def _any_collides(model: mujoco.MjModel) -> bool:

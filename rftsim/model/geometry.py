@@ -42,11 +42,16 @@ def colliding(model: mujoco.MjModel) -> "np.ndarray[Any, np.dtype[np.bool_]]":
     return can  # type: ignore[no-any-return]
 
 
+def own_geoms(model: mujoco.MjModel, body: int) -> range:
+    """The ids of all geoms of a body."""
+    first = int(model.body_geomadr[body])
+    return range(first, first + int(model.body_geomnum[body]))
+
+
 def bounding_geoms(model: mujoco.MjModel, body: int, geoms: Geoms) -> list[int]:
     """The ids of the geoms that bound a body."""
-    own = range(model.body_geomadr[body], model.body_geomadr[body] + model.body_geomnum[body])
-    found = [geom for geom in own if colliding(model)[geom]]
-    return found or (list(own) if geoms == "all" else [])
+    can, own = colliding(model), own_geoms(model, body)
+    return [geom for geom in own if can[geom]] or (list(own) if geoms == "all" else [])
 
 
 def geom_label(model: mujoco.MjModel, geom: int) -> str:
