@@ -10,7 +10,7 @@ import numpy as np
 
 from rftsim.errors import RftsimError
 from rftsim.model.readout import work, wrenches
-from rftsim.run.robot import Robot, measure, sinkages, total_force
+from rftsim.run.robot import Robot, measure, sinkages
 from rftsim.run.scenes import Staged
 from rftsim.run.start import begin
 from rftsim.run.validity import Validity, validity
@@ -131,7 +131,7 @@ def _row(staged: Staged, data: mujoco.MjData) -> tuple[Any, ...]:
     if measured.robot:
         deepest = next(iter(sinkages(model, data).values()))
         speed = math.hypot(velocity[3], velocity[4])
-        return data.time, speed, deepest, velocity[1], total_force(model, data), float(wrench.power.sum())
+        return data.time, speed, deepest, velocity[1], wrench.force.sum(axis=0), float(wrench.power.sum())
     below = measured.wheel_radius
     if below is None:
         corners = staged.bed.surfaces[measured.body].corners

@@ -184,12 +184,13 @@ def stage(
     Raises:
         RftsimError: No such scene, file or setting, or the scene cannot have sand.
     """
+    options = {option: value for option, value in options.items() if value is not None}
     scene, wheel = SCENES.get(name), None
     if scene is None:
         spec = _read(name, settings or {})
     else:
         spec, wheel = _built(name, scene, _chosen(name, scene.settings, settings or {}))
-        options = {**WHOLE, **_given(options)}
+        options = {**WHOLE, **options}
     _check_positive("timestep", timestep)
     _check_positive("duration", duration)
     if timestep is not None:
@@ -200,7 +201,7 @@ def stage(
             options["wheels"] = {wheels.WHEEL: Wheel((0, 1, 0), (0, 0, 0), wheel.outer_radius)}
     if sand is None:
         sand = scene.sand if scene else POPPY
-    bed = add_sand(spec, sand, law or (scene.law if scene else FILE_LAW), **_given(options))
+    bed = add_sand(spec, sand, law or (scene.law if scene else FILE_LAW), **options)
     model = spec.compile()
     if scene is None:
         measured = Measured(trunk(model, [model.body(name).id for name in bed.surfaces]), None, robot=True)
@@ -210,10 +211,6 @@ def stage(
         measured = Measured(wheels.WHEEL, wheel.outer_radius)
     duration = duration or (scene.duration if scene else FILE_DURATION)
     return Staged(model, bed, measured, duration, Start() if scene else start)
-
-
-def _given(options: Mapping[str, Any]) -> dict[str, Any]:
-    return {option: value for option, value in options.items() if value is not None}
 
 
 def _read(name: str, settings: Mapping[str, str]) -> mujoco.MjSpec:
