@@ -6,7 +6,7 @@ from types import ModuleType
 import mujoco
 
 from rftsim.files import Kept
-from rftsim.machine.sources import SOURCE
+from rftsim.machine.sources import source_of
 
 
 def remember(path: Path, *modules: ModuleType) -> Kept:
@@ -17,4 +17,4 @@ def remember(path: Path, *modules: ModuleType) -> Kept:
         *modules: The modules that a study measures with, besides what is compiled, and MuJoCo.
     """
     own = b"".join(Path(str(module.__file__)).read_bytes() for module in modules)
-    return Kept(path, SOURCE + own + mujoco.__version__.encode())
+    return Kept(path, source_of("engine") + own + mujoco.__version__.encode())

@@ -12,6 +12,7 @@ import mujoco
 
 from rftsim.engine import layout
 from rftsim.law import evaluate
+from rftsim.law.layout import GIVEN
 from rftsim.machine import link
 
 EXPLICIT: Final = "rftsim.sand"
@@ -64,7 +65,8 @@ def register(name: str) -> int:
     if memory.raw[:size].strip(b"\0") or memory.raw[size : size + 8] != b"\xff" * 8:
         raise layout.LayoutError(f"MuJoCo {mujoco.__version__} has another mjpPlugin; rftsim needs mujoco>=3.5,<5")
     layout.publish()
-    evaluate.linked()  # which the engine calls by name
+    evaluate.linked()  # which the solver calls by name, and the engine both
+    link.load("solver", GIVEN)("rftsim_step")
     address = link.load("engine", layout.GIVEN)
     plugin = _Plugin.from_buffer(memory)
     plugin.name = name.encode()

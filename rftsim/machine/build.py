@@ -2,9 +2,11 @@
 
 import importlib
 import logging
+import multiprocessing
 import re
 import sys
 import types
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any, Final
 
@@ -15,7 +17,8 @@ from numba import types as numba_types
 
 _LOG: Final = logging.getLogger(__name__)
 _PARTS: Final = {
-    "law": ("rftsim.law.exports", "rftsim.solver.newton", "rftsim.solver.time_step"),
+    "law": ("rftsim.law.exports",),
+    "solver": ("rftsim.solver.newton", "rftsim.solver.time_step"),
     "engine": ("rftsim.engine.callbacks",),
 }
 """The modules whose functions a part exports."""
@@ -114,24 +117,36 @@ def _builder(machine: llvm.TargetMachine) -> llvm.PassBuilder:
 
 
 def ship() -> None:
-    """Write the object files that ship, and the list of their hashes.
+    """Write the object files that ship, of the parts whose sources changed, side by side, and the list of their hashes.
 
     Raises:
         OSError: One cannot be written.
     """
-    logging.basicConfig(level=logging.INFO, format="%(message)s")
-    package = types.ModuleType("rftsim")  # instead of the package, which would compile for this machine first
+    link, given = _alone()
+    made = {part: link.is_made_from(link.shipped_file(part), link.key_of(part, given[part])) for part in _PARTS}
+    changed = [part for part in _PARTS if not made[part]]
+    with ProcessPoolExecutor(mp_context=multiprocessing.get_context("spawn")) as processes:
+        list(processes.map(_ship_part, changed))
+    link.SUMS.write_text("".join(f"{link.sum_of(path)}  {path.name}\n" for path in sorted(link.SHIPPED.glob("*.xz"))))
+
+
+def _alone() -> tuple[Any, dict[str, str]]:
+    """Stand in for the package, which would compile for this machine first; the linker, and what keys each part."""
+    package = types.ModuleType("rftsim")
     package.__path__ = [str(Path(__file__).parent.parent)]
     sys.modules["rftsim"] = package
     link, laws, structs = (importlib.import_module(f"rftsim.{name}") for name in _GIVING)
-    numba.config.CPU_NAME, numba.config.CPU_FEATURES = link.SHIPPED_FOR, ""
     structs.publish()
-    for part, given in (("law", laws.GIVEN), ("engine", structs.GIVEN)):
-        path = link.shipped_file(part)
-        code = build(part, link.SHIPPED_FOR)
-        if not link.write(path, link.key_of(given), code):
-            raise OSError(f"cannot write {path}")
-    link.SUMS.write_text("".join(f"{link.sum_of(path)}  {path.name}\n" for path in sorted(link.SHIPPED.glob("*.xz"))))
+    return link, {"law": laws.GIVEN, "solver": laws.GIVEN, "engine": structs.GIVEN}
+
+
+def _ship_part(part: str) -> None:
+    logging.basicConfig(level=logging.INFO, format="%(message)s")
+    link, given = _alone()
+    numba.config.CPU_NAME, numba.config.CPU_FEATURES = link.SHIPPED_FOR, ""
+    path = link.shipped_file(part)
+    if not link.write(path, link.key_of(part, given[part]), build(part, link.SHIPPED_FOR)):
+        raise OSError(f"cannot write {path}")
 
 
 if __name__ == "__main__":

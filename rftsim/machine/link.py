@@ -20,7 +20,7 @@ import llvmlite.binding as llvm
 
 from rftsim.errors import RftsimError
 from rftsim.files import replacing
-from rftsim.machine.sources import PACKAGE, SOURCE
+from rftsim.machine.sources import PACKAGE, source_of
 
 SHIPPED: Final = Path(__file__).parent / "shipped"
 SUMS: Final = SHIPPED / "SHA256SUMS"
@@ -32,10 +32,10 @@ _FEATURES: Final = ("avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe
 
 @functools.cache
 def load(part: str, given: str = "") -> Callable[[str], int]:
-    """Link a part into the process: `law`, or `engine`, which calls the law's.
+    """Link a part into the process, after those that it calls: the solver calls the law, and the engine both.
 
     Args:
-        part: Its name.
+        part: Its name, one of `sources.PARTS`.
         given: What else it is compiled from than the sources.
 
     Returns:
@@ -72,7 +72,7 @@ def _engine() -> llvm.ExecutionEngine:
 
 def object_file(part: str, given: str) -> bytes:
     """The object file of a part: what ships, what was compiled before, or what is compiled now."""
-    key = key_of(given)
+    key = key_of(part, given)
     if takes_shipped() and is_as_listed(shipped_file(part)) and (code := _read(shipped_file(part), key)) is not None:
         return code
     machine = f"{llvm.get_host_cpu_name()} {llvm.get_host_cpu_features().flatten()} {llvmlite.__version__}"
@@ -91,9 +91,9 @@ def object_file(part: str, given: str) -> bytes:
     return code
 
 
-def key_of(given: str) -> bytes:
+def key_of(part: str, given: str) -> bytes:
     """Identifies what a part is compiled from."""
-    return hashlib.sha256(SOURCE + given.encode()).digest()
+    return hashlib.sha256(source_of(part) + given.encode()).digest()
 
 
 def shipped_file(part: str) -> Path:
@@ -131,6 +131,11 @@ def folders() -> list[Path]:
     users = os.path.expanduser(os.environ.get("XDG_CACHE_HOME") or users)
     own = PACKAGE / "__pycache__"
     return [own, Path(users) / "numba"] if os.path.isabs(users) else [own]  # else it knows no home
+
+
+def is_made_from(path: Path, key: bytes) -> bool:
+    """Whether a file holds a part that was written under a key, and is as listed."""
+    return is_as_listed(path) and _read(path, key) is not None
 
 
 def _read(path: Path, key: bytes) -> bytes | None:

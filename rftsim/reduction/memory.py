@@ -23,7 +23,7 @@ import numpy as np
 from rftsim.errors import RftsimError
 from rftsim.files import replacing
 from rftsim.law.layout import BLOCK
-from rftsim.machine.sources import PACKAGE, SOURCE
+from rftsim.machine.sources import PACKAGE, source_of
 from rftsim.reduction.facets import Labels
 from rftsim.reduction.reduce import SEEDS, Economy, Partition, partition, put_together
 from rftsim.reduction.samples import Reach, free_reach
@@ -140,7 +140,7 @@ def _is_free(reaches: list[Reach]) -> bool:
 def _code() -> bytes:
     """A hash of the code that a reduction depends on."""
     own = [*sorted((PACKAGE / "reduction").glob("*.py")), *sorted((PACKAGE / "surface").glob("*.py"))]
-    return hashlib.sha256(SOURCE + b"".join(path.read_bytes() for path in own)).digest()
+    return hashlib.sha256(source_of("law") + b"".join(path.read_bytes() for path in own)).digest()
 
 
 def _name(surface: Surface, bed: Array, tolerance: float, reaches: list[Reach]) -> str:

@@ -18,7 +18,7 @@ from rftsim.machine import build, link, sources
 
 PACKAGE = Path(rftsim.__file__).parent
 MODELS = Path(__file__).parents[2] / "models"
-PARTS = {"law": laws.GIVEN, "engine": layout.GIVEN}
+PARTS = {"law": laws.GIVEN, "solver": laws.GIVEN, "engine": layout.GIVEN}
 
 FIRST_FORCE = """
 import json, sys, time
@@ -67,7 +67,7 @@ def fresh(tmp_path):
 @pytest.mark.parametrize("part", PARTS)
 def test_what_ships_was_made_from_these_sources(part):
     """Its key is that of the sources, and of MuJoCo's constants."""
-    key = link.key_of(PARTS[part])
+    key = link.key_of(part, PARTS[part])
     shipped = link.shipped_file(part).read_bytes()
     assert shipped.startswith(key), "compiled code was edited: `make native` makes its machine code anew"
     assert len(shipped) < 200_000
