@@ -23,9 +23,20 @@ TERMS: Final = len(tables.TABLE_C4)
 """Coefficients of each of f1, f2 and f3."""
 _MEDIUM: Final = [("dynamic", "f8"), *((name, "f8") for name in PARAMETERS), ("table", "f8", (3, TERMS))]
 
-BED: Final = np.dtype([("response", "f8"), ("up", "f8", 3), ("offset", "f8"), ("plane", "f8", 3), *_MEDIUM])
+BED: Final = np.dtype(
+    [
+        *(("response", "f8"), ("up", "f8", 3), ("offset", "f8"), ("plane", "f8", 3)),
+        *(("tolerance", "f8"), ("iterations", "f8")),
+        *_MEDIUM,
+    ]
+)
 """Packed sand: its law's place in RESPONSES, normal and offset of the free surface, normal of the plane of motion,
-whether the law is dynamic (0 or 1), the parameters (zero where unknown), and the coefficients of f1, f2 and f3."""
+tolerance and most iterations of the implicit force, whether the law is dynamic (0 or 1), the parameters (zero where
+unknown), and the coefficients of f1, f2 and f3."""
+TOLERANCE: Final = 3e-3
+"""Error of a body's velocity, relative, to which the implicit force is solved for unless the user says otherwise."""
+ITERATIONS: Final = 20
+"""Most iterations of one solution, unless the user says otherwise."""
 
 Medium = namedtuple("Medium", [name for name, *_ in _MEDIUM])  # type: ignore[misc]
 Medium.__doc__ = "The sand as a law reads it: fields of BED, which compiled loops keep in registers."
@@ -104,8 +115,24 @@ def record(numbers: Array, dtype: "np.dtype[Any]") -> Any:
     return numbers[: numbers_in(dtype)].view(np.dtype((np.record, dtype)))[0]
 
 
-def pack_bed(sand: Sand, law: Law, terrain: FreeSurface, plane: ArrayLike) -> Array:
+def pack_bed(
+    sand: Sand,
+    law: Law,
+    terrain: FreeSurface,
+    plane: ArrayLike,
+    *,
+    tolerance: float = TOLERANCE,
+    iterations: int = ITERATIONS,
+) -> Array:
     """Sand under a law as numbers, a record of BED.
+
+    Args:
+        sand: The medium.
+        law: The law of its force.
+        terrain: The surface that bounds it from above.
+        plane: Normal of the plane of motion of a planar law.
+        tolerance: Error of a body's velocity, relative, to which the implicit force is solved for.
+        iterations: Most iterations of one such solution.
 
     Raises:
         SandError: The law reads a parameter that is unknown of the sand, or is not one of LAWS nor made from one.
@@ -127,6 +154,7 @@ def pack_bed(sand: Sand, law: Law, terrain: FreeSurface, plane: ArrayLike) -> Ar
     bed = record(numbers, BED)
     bed.response, bed.dynamic = RESPONSES.index(law.response), law.dynamic
     bed.up, bed.offset, bed.plane = up, terrain.offset, normal / length
+    bed.tolerance, bed.iterations = tolerance, iterations
     for name in PARAMETERS:
         value = getattr(sand, name)
         bed[name] = 0.0 if value is None else value  # MuJoCo reads no NaN from XML
