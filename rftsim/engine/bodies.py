@@ -81,17 +81,10 @@ def add_wrench(t, body, x, force, moment, out):
 
 
 @exact
-def fill_jacobian(t, body, out):
-    """Jacobian of a body's twist about its origin, velocity first, (6, nv)."""
-    r = arm(t, body, t.xpos[3 * body : 3 * body + 3])
-    for row in range(6):
-        for dof in range(out.shape[1]):
-            out[row, dof] = 0.0
-    dof = last_dof(t, body)
-    while dof >= 0:
-        c = t.cdof[6 * dof : 6 * dof + 6]
-        out[0, dof] = c[3] + c[1] * r[2] - c[2] * r[1]
-        out[1, dof] = c[4] + c[2] * r[0] - c[0] * r[2]
-        out[2, dof] = c[5] + c[0] * r[1] - c[1] * r[0]
-        out[3, dof], out[4, dof], out[5, dof] = c[0], c[1], c[2]
-        dof = t.dof_parent[dof]
+def motion_by(t, body, dof, out):
+    """Fill out with the twist of a body about its origin by a degree of freedom that moves it, velocity first, (6,)."""
+    r, c = arm(t, body, t.xpos[3 * body : 3 * body + 3]), t.cdof[6 * dof : 6 * dof + 6]
+    out[0] = c[3] + c[1] * r[2] - c[2] * r[1]
+    out[1] = c[4] + c[2] * r[0] - c[0] * r[2]
+    out[2] = c[5] + c[0] * r[1] - c[1] * r[0]
+    out[3], out[4], out[5] = c[0], c[1], c[2]

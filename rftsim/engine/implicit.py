@@ -1,99 +1,59 @@
 """The sand's force at the end of the step, from what MuJoCo knows when it computes passive forces.
 
 At that moment the mass matrix and the constraints' Jacobians are current, and what drives the step is not: actuation,
-bias and the constraints' reference are the last step's. They are computed here (MuJoCo does it again, the same).
+bias and the constraints' reference are the last step's. They are computed here (MuJoCo does it again, the same). Each
+island of bodies that has one near the sand is then solved for alone, see `islands`; all else costs a bounding test.
 """
 
 from typing import Final
 
-from rftsim.engine import bodies, external, instance
+from rftsim.engine import bodies, constraints, external, instance, islands
 from rftsim.engine.layout import CONSTANTS
 from rftsim.law import exports
-from rftsim.law.body import header_at
+from rftsim.law.body import bed_at, header_at
 from rftsim.machine.compiling import inline
-from rftsim.machine.memory import doubles, int32s, matrix, pointer, release, stack_doubles, take
-from rftsim.solver import equation, linear_algebra, time_step
-from rftsim.solver.equation import KIND, TABLE
+from rftsim.machine.memory import doubles, int32s, pointer, release, stack_doubles, take
+from rftsim.solver import equation, linear_algebra, sparse, state, time_step
+from rftsim.solver.equation import TABLE, WORK
+from rftsim.solver.motion import size_of
+from rftsim.solver.sinking import is_near
 
-_K: Final = 0
-_B: Final = 1
-_I: Final = 2
-"""Where MuJoCo's efc_KBIP holds a row's stiffness, damping and impedance."""
 _UNDAMPED: Final = CONSTANTS["no_euler_damping"] | CONSTANTS["no_damping"]
 _EULER: Final = CONSTANTS["euler"]
 _IMPLICIT: Final = CONSTANTS["implicit"]
-_KIND: Final = {
-    "equality": KIND.equality,
-    "dof_friction": KIND.friction,
-    "tendon_friction": KIND.friction,
-    "joint_limit": KIND.limit,
-    "tendon_limit": KIND.limit,
-    "frictionless_contact": KIND.contact,
-    "pyramidal_contact": KIND.contact,
-    "elliptic_contact": KIND.cone,
-}
-_KINDS: Final = tuple(_KIND[name] for name in sorted(_KIND, key=CONSTANTS.__getitem__))
+_ISLANDS: Final = islands.TABLE
+_WORK: Final = len(WORK.names or ())
 
 
 @inline
-def _fill_mass(model, data, m, d, p):
-    """The mass matrix, from its lower triangle in rows."""
-    out = equation.plain_mass(p)
-    nv = out.shape[0]
-    number = int32s(pointer(m + model.M_rownnz), nv)
-    start = int32s(pointer(m + model.M_rowadr), nv)
-    total = start[nv - 1] + number[nv - 1]
-    column = int32s(pointer(m + model.M_colind), total)
-    value = doubles(pointer(d + data.M), total)
-    for i in range(nv):
-        for k in range(nv):
-            out[i, k] = 0.0
-    for i in range(nv):
-        for k in range(start[i], start[i] + number[i]):
-            out[i, column[k]] = value[k]
-            out[column[k], i] = value[k]
+def _numeric(model, m, number):
+    """Address of a numeric of the model."""
+    return pointer(m + model.numeric_data) + 8 * int32s(pointer(m + model.numeric_adr), number + 1)[number]
 
 
 @inline
-def _fill_drag(model, data, m, d, p):
-    """Fill the drag that the integrator takes implicitly, over the time step; whether there is any."""
-    out = equation.drag(p)
-    nv = out.shape[0]
-    for i in range(nv):
-        for k in range(nv):
-            out[i, k] = 0.0
-    integrator = int32s(m + model.opt_integrator, 1)[0]
-    if integrator == _EULER:
-        found = False
-        if int32s(m + model.opt_disableflags, 1)[0] & _UNDAMPED == 0:
-            damping = doubles(pointer(m + model.dof_damping), nv)
-            for i in range(nv):
-                out[i, i] = damping[i]
-                found = found or damping[i] != 0.0
-        return found
-    external.smooth_vel(m, d, 1 if integrator == _IMPLICIT else 0)
-    number = int32s(pointer(m + model.D_rownnz), nv)
-    start = int32s(pointer(m + model.D_rowadr), nv)
-    total = start[nv - 1] + number[nv - 1]
-    column = int32s(pointer(m + model.D_colind), total)
-    value = doubles(pointer(d + data.qDeriv), total)
-    for i in range(nv):
-        for k in range(start[i], start[i] + number[i]):
-            j = column[k]
-            if integrator == _IMPLICIT or j == i:
-                out[i, j] = -value[k]
-            elif j < i:  # implicitfast takes the lower triangle for both
-                out[i, j] = out[j, i] = -value[k]
-    return True
+def _find_near(model, m, t, address, old, out):
+    """Fill out with the places of the bodies that can be in the sand within the step, or last had their step split."""
+    sand, found = _numeric(model, m, instance.head(address).bed), 0
+    nv, h = pointer(m + model.nv), doubles(m + model.opt_timestep, 1)[0]
+    twist = doubles(stack_doubles(6), 6)
+    for k in range(instance.head(address).nbody):
+        body, surface = instance.body(address, k), _numeric(model, m, instance.numeric_of(address, k))
+        bodies.twist(t, body, twist[:3], twist[3:])
+        speed = size_of(twist, 2.0 * header_at(surface).gyration)
+        xpos, xmat = t.xpos[3 * body : 3 * body + 3], t.xmat[9 * body : 9 * body + 9]
+        is_split = state.kept_at(state.kept(old, nv, k)).drift > 0.0
+        if is_split or is_near(sand, surface, xpos, xmat, speed, h):
+            out[found] = k
+            found += 1
+    return found
 
 
 @inline
-def _fill_force(model, data, m, d, t, p):
-    """All smooth forces of this step but the sand's."""
-    bias = pointer(d + data.qfrc_bias)
+def _fill_smooth_force(model, data, m, d, t, out):
+    """Fill all smooth forces of this step but the sand's, (nv,)."""
+    bias, nv = pointer(d + data.qfrc_bias), out.size
     external.rne(m, d, 0, bias)
-    out = equation.smooth_force(p)
-    nv = out.size
     passive, actuator = doubles(pointer(d + data.qfrc_passive), nv), doubles(pointer(d + data.qfrc_actuator), nv)
     applied, weight = doubles(pointer(d + data.qfrc_applied), nv), doubles(bias, nv)
     for i in range(nv):
@@ -111,124 +71,207 @@ def _fill_force(model, data, m, d, t, p):
 
 
 @inline
-def _fill_row_jacobian(model, data, m, d, p):
-    """The Jacobian of MuJoCo's constraint rows, from its sparse or dense form."""
-    jacobian, n, nv = equation.row_jacobian(p), equation.head(p).nrow, equation.head(p).nv
-    if not external.is_sparse(m):
-        linear_algebra.copy_matrix(matrix(pointer(d + data.efc_J), n, nv), jacobian)
-        return
-    for i in range(n):
-        for k in range(nv):
-            jacobian[i, k] = 0.0
-    number = int32s(pointer(d + data.efc_J_rownnz), n)
-    start = int32s(pointer(d + data.efc_J_rowadr), n)
-    total = start[n - 1] + number[n - 1]
-    column, value = int32s(pointer(d + data.efc_J_colind), total), doubles(pointer(d + data.efc_J), total)
-    for i in range(n):
-        for k in range(start[i], start[i] + number[i]):
-            jacobian[i, column[k]] = value[k]
+def _sort(model, data, m, d, t, address, i):
+    """Fill the table of islands: the near bodies are there already, and the passive forces are without the sand's."""
+    nv = islands.head(i).nv
+    tree = int32s(pointer(m + model.dof_treeid), nv)
+    constraints.join_trees(model, data, m, d, i)
+    for k in range(islands.head(i).nbody):
+        dof = bodies.last_dof(t, instance.body(address, islands.near(i)[k]))
+        islands.island_of_body(i)[k] = tree[dof] if dof >= 0 else islands.NONE
+    islands.sort(i, tree)
 
 
 @inline
-def _fill_row_laws(data, contact, d, p):
-    """Fill each constraint row's kind, bound, damping and spring."""
-    n = equation.head(p).nrow
-    kind, bound = equation.row_kind(p), equation.row_bound(p)
-    damping, spring = equation.row_damping(p), equation.row_spring(p)
-    kinds, owner = int32s(pointer(d + data.efc_type), n), int32s(pointer(d + data.efc_id), n)
-    loss, kbip = doubles(pointer(d + data.efc_frictionloss), n), matrix(pointer(d + data.efc_KBIP), n, 4)
-    inside = 0  # rows of the elliptic contact at hand
-    for i in range(n):
-        kind[i], bound[i] = _KINDS[kinds[i]], loss[i]
-        stiffness, damping[i], impedance = kbip[i, _K], kbip[i, _B], kbip[i, _I]
-        spring[i] = stiffness * impedance
-        if kind[i] >= KIND.contact:  # a pyramid's rows mix gap and slip
-            spring[i] = 0.0
-        if kind[i] == KIND.cone:
-            inside = inside + 1 if i > 0 and kinds[i - 1] == kinds[i] and owner[i - 1] == owner[i] else 0
-            at = pointer(d + data.contact) + contact.size * owner[i]
-            if inside == 0:
-                bound[i] = doubles(at + contact.mu, 1)[0]
-            else:
-                kind[i] = KIND.tangent
-                bound[i] = doubles(at + contact.friction, 5)[inside - 1]
+def _compute_drives(model, data, m, d, t, i):
+    """Have MuJoCo compute what drives the step: actuation, the derivatives of drag, the rows' reference, the bias."""
+    if pointer(m + model.nu) > 0:
+        external.fwd_actuation(m, d)  # before the drag, which leaves out actuators at their limits
+    integrator = int32s(m + model.opt_integrator, 1)[0]
+    if integrator != _EULER:
+        external.smooth_vel(m, d, 1 if integrator == _IMPLICIT else 0)
+    if islands.head(i).nrow > 0:
+        external.reference_constraint(m, d)
+    _fill_smooth_force(model, data, m, d, t, islands.smooth_force(i))
 
 
 @inline
-def _fill_rows(model, data, contact, m, d, p, dragged):
-    """MuJoCo's constraint rows."""
-    n, nv = equation.head(p).nrow, equation.head(p).nv
-    if n == 0:
-        return
-    external.reference_constraint(m, d)
-    linear_algebra.copy(doubles(pointer(d + data.efc_D), n), equation.first_stiffness(p))
-    linear_algebra.copy(doubles(pointer(d + data.efc_aref), n), equation.first_reference(p))
-    _fill_row_jacobian(model, data, m, d, p)
-    _fill_row_laws(data, contact, d, p)
-    jacobian, seen, drag = equation.row_jacobian(p), equation.row_drag(p), equation.drag(p)
-    for i in range(n):
-        for k in range(nv):
-            seen[i, k] = 0.0
-    if not dragged:
-        return
-    factors, order, solved = equation.mass_factors(p), equation.mass_order(p), equation.change(p)
-    linear_algebra.factor_of(equation.plain_mass(p), factors, order)
-    for i in range(n):
-        linear_algebra.substitute(factors, order, jacobian[i], solved)
-        linear_algebra.add_transposed(drag, solved, 1.0, seen[i])
-
-
-@inline
-def _fill_bodies(model, m, t, address, p):
-    """The bodies of the instance whose block is at an address."""
-    v, w = doubles(stack_doubles(3), 3), doubles(stack_doubles(3), 3)
-    numerics = int32s(pointer(m + model.numeric_adr), pointer(m + model.nnumeric))
-    first = pointer(m + model.numeric_data)
-    lengths, surfaces = equation.length(p), equation.surface(p)
-    sand = first + 8 * numerics[instance.head(address).bed]
-    equation.head(p).sand = sand
-    for k in range(instance.head(address).nbody):
-        body = instance.body(address, k)
-        surfaces[k] = first + 8 * numerics[instance.numeric_of(address, k)]
-        lengths[k] = header_at(surfaces[k]).gyration
-        bodies.fill_jacobian(t, body, equation.jacobian(p, k))
-        r, f = equation.rotation(p, k), equation.frame(p, k)
+def _fill_bodies(model, m, t, address, old, i, island, p):
+    """Fill the bodies of an island's equation, and what their motion couples."""
+    nv, place, first = islands.head(i).nv, islands.place_of(i), islands.body_start(i)[island]
+    sand, v, w = equation.head(p).sand, doubles(stack_doubles(3), 3), doubles(stack_doubles(3), 3)
+    for b in range(equation.head(p).nbody):
+        k = islands.near(i)[islands.members(i)[first + b]]
+        body, surface = instance.body(address, k), _numeric(model, m, instance.numeric_of(address, k))
+        equation.surface(p)[b], equation.length(p)[b] = surface, header_at(surface).gyration
+        r, f, path, n = equation.rotation(p, b), equation.frame(p, b), equation.path(p, b), 0
+        dof = bodies.last_dof(t, body)
+        while dof >= 0:
+            n, dof = n + 1, t.dof_parent[dof]
+        equation.path_length(p)[b] = n
+        dof = bodies.last_dof(t, body)
+        for at in range(n - 1, -1, -1):
+            path[at] = place[dof]
+            bodies.motion_by(t, body, dof, equation.motion(p, b, at))
+            dof = t.dof_parent[dof]
+        if n > 1:
+            sparse.join(p, path[n - 1], path, n - 1)
         linear_algebra.copy(t.xmat[9 * body : 9 * body + 9], r)
         bodies.twist(t, body, v, w)
         x = t.xpos[3 * body : 3 * body + 3].ctypes.data
-        exports.frame(sand, surfaces[k], x, r.ctypes.data, v.ctypes.data, w.ctypes.data, f.ctypes.data)
+        exports.frame(sand, surface, x, r.ctypes.data, v.ctypes.data, w.ctypes.data, f.ctypes.data)
+        linear_algebra.copy(
+            doubles(state.kept(old, nv, k), state.KEPT_NUMBERS),
+            doubles(equation.kept_address(p, b), state.KEPT_NUMBERS),
+        )
+        numbers, kept = equation.numbers(p), equation.kept(p, b)
+        numbers.drift, numbers.parts = max(numbers.drift, kept.drift), max(numbers.parts, kept.parts)
+
+
+@inline
+def _couple(number, start, column, i, island, p):
+    """Couple what a matrix of MuJoCo's couples below its diagonal: so many columns of each row, from a start."""
+    place, dofs, first = islands.place_of(i), islands.dofs(i), islands.dof_start(i)[island]
+    for k in range(equation.head(p).ndof):
+        dof = dofs[first + k]
+        for entry in range(start[dof], start[dof] + number[dof]):
+            if column[entry] < dof:
+                sparse.couple(p, k, place[column[entry]])
+
+
+@inline
+def _fill_mass(model, data, m, d, i, island, p):
+    """Fill the mass matrix of an island, from its lower triangle in rows; its pattern is there."""
+    nv, place, dofs, first = islands.head(i).nv, islands.place_of(i), islands.dofs(i), islands.dof_start(i)[island]
+    number, start = int32s(pointer(m + model.M_rownnz), nv), int32s(pointer(m + model.M_rowadr), nv)
+    total = start[nv - 1] + number[nv - 1]
+    column, value = int32s(pointer(m + model.M_colind), total), doubles(pointer(d + data.M), total)
+    out = equation.plain_mass(p)
+    sparse.clear(p, out)
+    for k in range(out.shape[0]):
+        dof = dofs[first + k]
+        for entry in range(start[dof], start[dof] + number[dof]):
+            other = place[column[entry]]
+            out[k, other] = out[other, k] = value[entry]
+
+
+@inline
+def _fill_drag(model, data, m, d, i, island, p):
+    """Fill the drag that the integrator takes implicitly, over the time step, and whether there is any."""
+    nv, place, dofs, first = islands.head(i).nv, islands.place_of(i), islands.dofs(i), islands.dof_start(i)[island]
+    out, numbers, integrator = equation.drag(p), equation.numbers(p), int32s(m + model.opt_integrator, 1)[0]
+    sparse.clear(p, out)
+    numbers.dragged = 0.0
+    if integrator == _EULER:
+        if int32s(m + model.opt_disableflags, 1)[0] & _UNDAMPED == 0:
+            damping = doubles(pointer(m + model.dof_damping), nv)
+            for k in range(out.shape[0]):
+                out[k, k] = damping[dofs[first + k]]
+                numbers.dragged = 1.0 if out[k, k] != 0.0 else numbers.dragged
+        return
+    number, start = int32s(pointer(m + model.D_rownnz), nv), int32s(pointer(m + model.D_rowadr), nv)
+    total = start[nv - 1] + number[nv - 1]
+    column, value = int32s(pointer(m + model.D_colind), total), doubles(pointer(d + data.qDeriv), total)
+    for k in range(out.shape[0]):
+        dof = dofs[first + k]
+        for entry in range(start[dof], start[dof] + number[dof]):
+            j = column[entry]
+            numbers.dragged = 1.0 if value[entry] != 0.0 else numbers.dragged
+            if integrator == _IMPLICIT or j == dof:
+                out[k, place[j]] = -value[entry]
+            elif j < dof:  # implicitfast takes the lower triangle for both
+                out[k, place[j]] = out[place[j], k] = -value[entry]
+
+
+@inline
+def _fill_dofs(model, data, m, d, old, i, island, p):
+    """Fill what an island's equation has of each degree of freedom, and its matrices; rows and bodies are there."""
+    nv, dofs, first = islands.head(i).nv, islands.dofs(i), islands.dof_start(i)[island]
+    velocity, lacking = doubles(pointer(d + data.qvel), nv), state.lacking(old, nv)
+    light, smooth = doubles(pointer(m + model.dof_invweight0), nv), islands.smooth_force(i)
+    for k in range(equation.head(p).ndof):
+        dof = dofs[first + k]
+        equation.velocity(p)[k], equation.lacking(p)[k] = velocity[dof], lacking[dof]
+        equation.lightness(p)[k], equation.smooth_force(p)[k] = light[dof], smooth[dof]
+    numbers = int32s(pointer(m + model.M_rownnz), nv), int32s(pointer(m + model.M_rowadr), nv)
+    last = numbers[0][nv - 1] + numbers[1][nv - 1]
+    _couple(numbers[0], numbers[1], int32s(pointer(m + model.M_colind), last), i, island, p)
+    if int32s(m + model.opt_integrator, 1)[0] != _EULER:
+        drags = int32s(pointer(m + model.D_rownnz), nv), int32s(pointer(m + model.D_rowadr), nv)
+        last = drags[0][nv - 1] + drags[1][nv - 1]
+        _couple(drags[0], drags[1], int32s(pointer(m + model.D_colind), last), i, island, p)
+    sparse.close(p)
+    _fill_mass(model, data, m, d, i, island, p)
+    _fill_drag(model, data, m, d, i, island, p)
+    if equation.head(p).nrow > 0 and equation.numbers(p).dragged > 0.0:
+        sparse.copy(p, equation.plain_mass(p), equation.plain_factors(p))
+        sparse.factor(p, equation.plain_factors(p))
+
+
+@inline
+def _hand_over(model, data, m, d, address, new, i, island, p):
+    """Add an island's force to MuJoCo's passive ones, and keep what must last."""
+    nv, dofs, first = islands.head(i).nv, islands.dofs(i), islands.dof_start(i)[island]
+    force, lacking = doubles(pointer(d + data.qfrc_passive), nv), state.lacking(new, nv)
+    for k in range(equation.head(p).ndof):
+        dof = dofs[first + k]
+        force[dof] += equation.out(p)[k]
+        lacking[dof] = equation.lacking(p)[k]
+    first = islands.body_start(i)[island]
+    for b in range(equation.head(p).nbody):
+        k = islands.near(i)[islands.members(i)[first + b]]
+        linear_algebra.copy(equation.wrench(p, b), instance.wrench(address, k))
+        linear_algebra.copy(
+            doubles(equation.kept_address(p, b), state.KEPT_NUMBERS),
+            doubles(state.kept(new, nv, k), state.KEPT_NUMBERS),
+        )
+
+
+@inline
+def _solve(model, data, contact, m, d, t, address, old, new, i, island):
+    """Solve for the sand's force on one island."""
+    p, work = stack_doubles(TABLE), doubles(stack_doubles(_WORK), _WORK)
+    linear_algebra.clear(work)
+    counts = islands.body_count(i)[island], islands.dof_count(i)[island], islands.row_count(i)[island]
+    memory = take(equation.lay_out(p, counts[0], counts[1], counts[2]))
+    equation.place(p, memory)
+    head, numbers = equation.head(p), equation.numbers(p)
+    head.sand, head.work = _numeric(model, m, instance.head(address).bed), work.ctypes.data
+    bed = bed_at(head.sand)
+    numbers.tolerance, numbers.iterations = bed.tolerance, bed.iterations
+    numbers.drift = numbers.parts = 0.0
+    numbers.timestep, numbers.started = doubles(m + model.opt_timestep, 1)[0], state.started(old)[0]
+    for k in range(counts[1]):
+        equation.coupled_length(p)[k] = 0
+    _fill_bodies(model, m, t, address, old, i, island, p)
+    constraints.fill_rows(model, data, contact, m, d, i, island, p)
+    _fill_dofs(model, data, m, d, old, i, island, p)
+    time_step.step(p)
+    _hand_over(model, data, m, d, address, new, i, island, p)
+    instance.add_work(address, work, counts[0] / islands.head(i).nbody)
+    release(memory)
 
 
 @inline
 def press(model, data, contact, m, d, number):
     """Solve for the sand's force at the end of the step and add it to qfrc_passive."""
     address = instance.block_of(model, data, m, d, number)
-    nv, nbody = pointer(m + model.nv), instance.head(address).nbody
-    old, wrenches = instance.lasting(model, data, m, d, number), instance.all_wrenches(address)
-    for i in range(wrenches.size):
-        wrenches[i] = 0.0
+    nv, nbody, nrow = pointer(m + model.nv), instance.head(address).nbody, int32s(d + data.nefc, 1)[0]
+    lasting, wrenches = instance.lasting(model, data, m, d, number), instance.all_wrenches(address)
+    old, new = lasting.ctypes.data, instance.pending(address, lasting.size)
+    linear_algebra.clear(wrenches)
+    linear_algebra.clear(new)
+    state.started(new.ctypes.data)[0] = 1.0
     instance.count(address, 0.0)
-    rows = int32s(d + data.nefc, 1)[0]
-    p = stack_doubles(TABLE)
-    memory = take(equation.lay_out(p, nbody, nv, rows))
-    equation.place(p, memory)
-    head = equation.head(p)
-    head.old, head.new = old.ctypes.data, instance.pending(address, old.size).ctypes.data
-    head.work = instance.counters(address)
-    linear_algebra.copy(doubles(pointer(d + data.qvel), nv), equation.velocity(p))
-    equation.numbers(p).timestep = doubles(m + model.opt_timestep, 1)[0]
-    t = bodies.tree(model, data, m, d)
-    _fill_bodies(model, m, t, address, p)
-    if time_step.is_needed(p) != 0:
-        external.fwd_actuation(m, d)  # before the drag, which leaves out actuators at their limits
-        _fill_mass(model, data, m, d, p)
-        dragged = _fill_drag(model, data, m, d, p)
-        _fill_force(model, data, m, d, t, p)
-        _fill_rows(model, data, contact, m, d, p, dragged)
-        time_step.step(p)
-        force = doubles(pointer(d + data.qfrc_passive), nv)
-        q = equation.out(p)
-        for i in range(nv):
-            force[i] += q[i]
-        linear_algebra.copy(equation.all_wrenches(p), wrenches)
+    t, i = bodies.tree(model, data, m, d), stack_doubles(_ISLANDS)
+    memory = take(islands.lay_out(i, pointer(m + model.ntree), nv, nbody, nrow))
+    islands.begin(i, memory)
+    found = _find_near(model, m, t, address, old, islands.near(i))
+    islands.head(i).nbody = found
+    if found > 0:
+        _sort(model, data, m, d, t, address, i)
+        _compute_drives(model, data, m, d, t, i)
+        for island in range(islands.head(i).ntree):
+            if islands.body_count(i)[island] > 0:
+                _solve(model, data, contact, m, d, t, address, old, new.ctypes.data, i, island)
     release(memory)

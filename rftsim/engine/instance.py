@@ -146,6 +146,15 @@ def count(address, evaluations):
 
 
 @exact
+def add_work(address, work, share):
+    """Add a share of the cost of a solution, a record of the solver's WORK, to that of the last force of a block."""
+    counted = _counters_at(counters(address))
+    counted.evaluations += share * work[0]
+    counted.derivatives += share * work[1]
+    counted.unsolved += work[2]
+
+
+@exact
 def pending(address, size):
     """The state after the step under way, (size,)."""
     return doubles(address + block.state_start(head(address).nbody), size)

@@ -74,6 +74,8 @@ class Model(NamedTuple):
 
     nbody: int
     nv: int
+    nu: int
+    ntree: int
     nnumeric: int
     nsite: int
     nsensor: int
@@ -84,6 +86,8 @@ class Model(NamedTuple):
     body_dofadr: int
     body_plugin: int
     dof_parentid: int
+    dof_treeid: int
+    dof_invweight0: int
     numeric_adr: int
     numeric_size: int
     numeric_data: int

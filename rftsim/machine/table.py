@@ -57,13 +57,13 @@ class Table:
 
         return get
 
-    def vectors(self, size: Size, *count: Size) -> Any:
+    def vectors(self, size: Size, *count: Size, view: Any = doubles) -> Any:
         """Declare as many vectors as the product of counts says, and make what gives the k-th from p and k."""
         entry, n = self._declare(size, *count), self._number(size)
 
         @exact
         def get(p, k):
-            return doubles(_address(p, entry) + 8 * k * n(p), n(p))
+            return view(_address(p, entry) + 8 * k * n(p), n(p))
 
         return get
 

@@ -4,89 +4,120 @@ from typing import Final
 
 from rftsim.machine.compiling import exact
 from rftsim.machine.memory import doubles, stack_doubles
-from rftsim.solver import equation, linear_algebra, linearised
+from rftsim.solver import equation, linear_algebra, linearised, sparse
 from rftsim.solver.equation import POINT
-from rftsim.solver.motion import evaluate, generalised, speed_of, twist_of
+from rftsim.solver.motion import add_wrench, evaluate, generalised, speed_of, twist_of
 
 CENTRED: Final = 3e-3
 """Effect of the force's change within a step on a body's velocity, relative, from which on it is counted."""
+CURVED: Final = 10.0
+"""That effect, over the smallest that is counted, from which on the force at the mean velocity is evaluated."""
 
 
 @exact
-def centre(p):
+def centre(p, accepted):
     """Fill `end`: one step of Newton's method from the best point, without an evaluation.
 
     It is corrected to first order for the force at the step's mean velocity instead of its end. What is stiff against
     the mass is left out of that, by M A^-1: a body that stops in the step stays stopped.
+
+    Args:
+        p: The equation.
+        accepted: Whether `search` holds that step already.
     """
-    known = equation.numbers(p).knows_derivative > 0.0
-    v, start, end = equation.velocity_of(p, POINT.best), equation.start(p), equation.end(p)
-    mean = equation.mean(p)
-    linear_algebra.copy(v, end)
+    v, start, end, mean = equation.velocity_of(p, POINT.best), equation.start(p), equation.end(p), equation.mean(p)
+    if accepted:
+        for k in range(v.size):
+            end[k] = v[k] + equation.search(p)[k]
+    else:
+        linearised.solution(p, v, equation.residual_of(p, POINT.best), linearised.EXACT, end)
+    _follow(p)
     for k in range(v.size):
-        mean[k] = v[k] - start[k]
-    is_small = not known or _is_small(p, mean, v, 0.5)
-    scores = equation.scores(p, POINT.best)
-    if is_small and scores.missing < 1e-4 * scores.scale:
+        mean[k] = end[k] - start[k]
+    if _largest(p, mean, end) <= 2.0:
         return
-    which = linearised.EXACT if known else linearised.NONE
-    linearised.solution(p, v, equation.residual_of(p, POINT.best), which, end)
-    if is_small or _is_foreseen_small(p):
-        return
-    _correct(p)
+    effect = _foresee(p)
+    if effect > CURVED:
+        _evaluate(p)
+    if effect > 1.0:
+        _correct(p)
 
 
 @exact
-def _is_small(p, change, v, share):
-    """Whether a share of a velocity change makes no difference to any body."""
-    v_c = equation.numbers(p).v_c
+def _follow(p):
+    """Take the best point's wrenches to `end`, as the derivatives foresee."""
+    change, twist, wrench = equation.change(p), doubles(stack_doubles(6), 6), doubles(stack_doubles(6), 6)
+    v, end = equation.velocity_of(p, POINT.best), equation.end(p)
+    for k in range(v.size):
+        change[k] = end[k] - v[k]
     for b in range(equation.head(p).nbody):
-        if share * speed_of(p, b, change) > CENTRED * speed_of(p, b, v) + 10.0 * v_c:
-            return False
-    return True
+        if equation.kept(p, b).known == 0.0:
+            continue
+        twist_of(p, b, change, twist)
+        linear_algebra.multiply(equation.derivative(p, b), twist, wrench)
+        now, later = equation.wrench_of(p, POINT.best, b, 0), equation.wrench_of(p, POINT.best, b, 1)
+        for r in range(6):
+            now[r] += wrench[r]
+            later[r] += wrench[r]
 
 
 @exact
-def _is_foreseen_small(p):
-    """Whether the correction by the derivative, at a velocity change in `mean`, makes no difference to any body."""
+def _largest(p, change, end):
+    """The largest change of a body's velocity over the smallest that is counted."""
+    v_c, largest = equation.numbers(p).v_c, 0.0
+    for b in range(equation.head(p).nbody):
+        largest = max(largest, speed_of(p, b, change) / (CENTRED * speed_of(p, b, end) + 10.0 * v_c))
+    return largest
+
+
+@exact
+def _foresee(p):
+    """Fill `filtered` with the effect of the mean velocity, as the derivatives foresee; its largest, see `_largest`."""
     h, mean, difference = equation.numbers(p).h, equation.mean(p), equation.difference(p)
     twist, wrench = doubles(stack_doubles(6), 6), doubles(stack_doubles(6), 6)
-    for k in range(mean.size):
-        difference[k] = 0.0
+    linear_algebra.clear(difference)
     for b in range(equation.head(p).nbody):
+        if equation.kept(p, b).known == 0.0:
+            continue
         twist_of(p, b, mean, twist)
         linear_algebra.multiply(equation.derivative(p, b), twist, wrench)
-        linear_algebra.add_transposed(equation.jacobian(p, b), wrench, -0.5 * h, difference)
+        add_wrench(p, b, wrench, -0.5 * h, difference)
     _filter(p, difference, equation.filtered(p))
-    return _is_small(p, equation.filtered(p), equation.velocity_of(p, POINT.best), 1.0)
+    return _largest(p, equation.filtered(p), equation.end(p))
+
+
+@exact
+def _evaluate(p):
+    """Fill `filtered` with the effect of the force at the mean velocity, from one evaluation."""
+    h, end, start, there = equation.numbers(p).h, equation.end(p), equation.start(p), equation.there(p)
+    for k in range(end.size):
+        there[k] = 0.5 * (start[k] + end[k])
+    evaluate(p, there, POINT.spare)
+    q, difference = equation.others(p), equation.difference(p)
+    generalised(p, POINT.spare, 0, difference)
+    generalised(p, POINT.best, 0, q)
+    for k in range(end.size):
+        difference[k] = h * (difference[k] - q[k])
+    _filter(p, difference, equation.filtered(p))
 
 
 @exact
 def _correct(p):
-    """Add the effect of the force at the mean velocity, from one evaluation, to `end`."""
-    h, v, start = equation.numbers(p).h, equation.velocity_of(p, POINT.best), equation.start(p)
-    mean, difference, changed = equation.mean(p), equation.difference(p), equation.filtered(p)
-    linear_algebra.multiply(equation.mass(p), mean, difference)
-    largest = 0.25 * linear_algebra.dot(mean, difference)
-    for k in range(v.size):
-        mean[k] = 0.5 * (start[k] + v[k])
-    evaluate(p, mean, POINT.spare)
-    generalised(p, POINT.spare, 0, difference)
-    generalised(p, POINT.best, 0, mean)
-    for k in range(v.size):
-        difference[k] = h * (difference[k] - mean[k])
-    _filter(p, difference, changed)
-    linear_algebra.multiply(equation.mass(p), changed, difference)
-    if linear_algebra.dot(changed, difference) <= largest:  # else the derivative is not to be trusted
+    """Add the effect of the mean velocity to `end`, unless it is larger than half of the step's change of velocity."""
+    mean, changed, impulse = equation.mean(p), equation.filtered(p), equation.difference(p)
+    sparse.multiply(p, equation.mass(p), mean, impulse)
+    largest = 0.25 * linear_algebra.dot(mean, impulse)
+    sparse.multiply(p, equation.mass(p), changed, impulse)
+    if linear_algebra.dot(changed, impulse) <= largest:  # else the derivative is not to be trusted
         end = equation.end(p)
-        for k in range(v.size):
+        for k in range(end.size):
             end[k] += changed[k]
 
 
 @exact
 def _filter(p, impulse, out):
     """Fill out with A^-1 M A^-1 impulse, A the matrix that the linearised equation left factored."""
-    factors, order, between = equation.linear_factors(p), equation.linear_order(p), equation.solved(p)
-    linear_algebra.substitute(factors, order, impulse, out)
-    linear_algebra.multiply(equation.mass(p), out, between)
-    linear_algebra.substitute(factors, order, between, out)
+    factors, between = equation.linear_factors(p), equation.solved(p)
+    sparse.substitute(p, factors, impulse, out)
+    sparse.multiply(p, equation.mass(p), out, between)
+    sparse.substitute(p, factors, between, out)

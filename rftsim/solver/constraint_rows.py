@@ -10,7 +10,7 @@ import numpy as np
 
 from rftsim.law.stress import TINY
 from rftsim.machine.compiling import exact
-from rftsim.solver import equation, linear_algebra
+from rftsim.solver import equation, sparse
 from rftsim.solver.equation import KIND
 
 FREE: Final = 0
@@ -20,13 +20,53 @@ SLIDING: Final = 2
 
 
 @exact
+def product(p, i, v):
+    """The velocity of row i at a generalised one."""
+    path, j, total = equation.row_path(p, i), equation.row_jacobian(p, i), 0.0
+    for k in range(equation.row_length(p)[i]):
+        total += j[k] * v[path[k]]
+    return total
+
+
+@exact
+def _seen(p, change):
+    """M^-1 M_h of a velocity change: the change that MuJoCo's solver of the constraints sees."""
+    if equation.numbers(p).dragged == 0.0:
+        return change
+    h, dragged, seen = equation.numbers(p).h, equation.slowed(p), equation.seen(p)
+    sparse.multiply(p, equation.drag(p), change, dragged)
+    sparse.substitute(p, equation.plain_factors(p), dragged, seen)
+    for k in range(seen.size):
+        seen[k] = change[k] + h * seen[k]
+    return seen
+
+
+@exact
+def changes(p, change, out):
+    """Fill out with J a at a velocity change, (nrow,)."""
+    seen, inverse = _seen(p, change), 1.0 / equation.numbers(p).h
+    for i in range(out.size):
+        out[i] = inverse * product(p, i, seen)
+
+
+@exact
 def accelerations(p, change, out):
     """Fill out with J a - aref at a velocity change v+ - v, (nrow,)."""
-    linear_algebra.multiply(equation.row_acceleration(p), change, out)
+    changes(p, change, out)
     reference = equation.row_reference(p)
-    h = equation.numbers(p).h
     for i in range(out.size):
-        out[i] = out[i] / h - reference[i]
+        out[i] -= reference[i]
+
+
+@exact
+def add_forces(p, force, share, out):
+    """Add a share of the rows' generalised force to out."""
+    for i in range(force.size):
+        y = share * force[i]
+        if y != 0.0:
+            path, j = equation.row_path(p, i), equation.row_jacobian(p, i)
+            for k in range(equation.row_length(p)[i]):
+                out[path[k]] += y * j[k]
 
 
 @exact
@@ -95,10 +135,44 @@ def _stiffness_of(kind, stiffness, bound, x, force):
 
 
 @exact
+def note_zones(p, x):
+    """Note which rows act at x; whether any does otherwise than noted, or its stiffness changes as it slides."""
+    kind, stiffness, bound = equation.row_kind(p), equation.row_stiffness(p), equation.row_bound(p)
+    zone = equation.row_zone(p)
+    changed, i = False, np.int64(0)
+    while i < kind.size:
+        last, now = i + 1, np.int64(STICKING)
+        if kind[i] == KIND.cone:
+            last = last_of_cone(kind, i)
+            now = np.int64(cone_forces(x, stiffness, bound, i, last, equation.row_tried(p))[0])
+        elif _stiffness_of(kind[i], stiffness[i], bound[i], x[i], stiffness[i] * x[i]) == 0.0:
+            now = np.int64(FREE)
+        changed = changed or zone[i] != now or now == SLIDING
+        zone[i] = now
+        i = last
+    return changed
+
+
+@exact
+def _add_product(p, r, k, share, a):
+    """Add a share of the product of rows r and k, as the solver sees the latter, to a matrix.
+
+    M^-1 M_h is taken for diagonal here, 1 + h drag / mass: it is not in the residual.
+    """
+    rows, columns, left, right = equation.row_path(p, r), equation.row_path(p, k), equation.row_jacobian(p, r), 0.0
+    j, light, drag, h = equation.row_jacobian(p, k), equation.lightness(p), equation.drag(p), equation.numbers(p).h
+    is_dragged = equation.numbers(p).dragged > 0.0
+    for m in range(equation.row_length(p)[k]):
+        column = columns[m]
+        right = share * j[m] * ((1.0 + h * drag[column, column] * light[column]) if is_dragged else 1.0)
+        for i in range(equation.row_length(p)[r]):
+            a[rows[i], column] += left[i] * right
+
+
+@exact
 def _add_sliding(p, x, first, last, normal, tangential, a):
     """Add the stiffness of an elliptic contact that slides."""
     stiffness, bound = equation.row_stiffness(p), equation.row_bound(p)
-    j, acceleration = equation.row_jacobian(p), equation.row_acceleration(p)
     mu = bound[first]
     d = stiffness[first] / (mu * mu * (1.0 + mu * mu))
     turn = mu * (normal - mu * tangential) / (tangential + TINY)  # of the friction's direction; negative
@@ -114,27 +188,26 @@ def _add_sliding(p, x, first, last, normal, tangential, a):
                 share = -d * mu * ur
             else:
                 share = d * ((mu * mu + turn) * ur * uk - (turn if r == k else 0.0))
-            linear_algebra.add_outer(a, j[r], acceleration[k], share * bound[r] * bound[k])
+            _add_product(p, r, k, share * bound[r] * bound[k], a)
 
 
 @exact
 def add_stiffness(p, x, force, a):
-    """Add J' H J M^-1 M_h to a matrix (nv, nv), H the derivative of the rows' forces at x, sign reversed."""
+    """Add J' H J M^-1 M_h to a matrix (ndof, ndof), H the derivative of the rows' forces at x, sign reversed."""
     kind, stiffness, bound = equation.row_kind(p), equation.row_stiffness(p), equation.row_bound(p)
-    j, acceleration = equation.row_jacobian(p), equation.row_acceleration(p)
     i = np.int64(0)  # no constant, for which numba would compile what takes it anew
     while i < kind.size:
         if kind[i] != KIND.cone:
             active = _stiffness_of(kind[i], stiffness[i], bound[i], x[i], force[i])
             if active > 0.0:
-                linear_algebra.add_outer(a, j[i], acceleration[i], active)
+                _add_product(p, i, i, active, a)
             i += 1
             continue
         last = last_of_cone(kind, i)
         zone, normal, tangential = cone_forces(x, stiffness, bound, i, last, force)
         if zone == STICKING:
             for k in range(i, last):
-                linear_algebra.add_outer(a, j[k], acceleration[k], stiffness[k])
+                _add_product(p, k, k, stiffness[k], a)
         elif zone == SLIDING:
             _add_sliding(p, x, i, last, normal, tangential, a)
         i = last

@@ -4,7 +4,8 @@ from typing import Final
 
 from rftsim.law.stress import TINY
 from rftsim.machine.compiling import exact
-from rftsim.solver import constraint_rows, equation, linear_algebra
+from rftsim.machine.memory import doubles, stack_doubles
+from rftsim.solver import constraint_rows, equation, linear_algebra, sparse
 
 NONE: Final = 0
 EXACT: Final = 1
@@ -12,6 +13,8 @@ COMPLETED: Final = 2
 """Which derivative of the sand's force the linearised equation takes."""
 ITERATIONS: Final = 20
 """Steps of Newton's method on the rows, and trials of one step's length, at most."""
+EXACTNESS: Final = (1e-16, 1e-6, 1e-6)
+"""Square of the share of the missing impulse that may be left, by which derivative is taken."""
 
 
 @exact
@@ -22,44 +25,38 @@ def _derivative(p, which, b):
 
 
 @exact
-def _is_zero(g, r):
-    """Whether a row of a matrix holds nothing but zeros."""
-    any_force = False
-    for c in range(g.shape[1]):
-        any_force = any_force or g[r, c] != 0.0
-    return not any_force
+def _add_derivative(p, b, g, a):
+    """Add -h J' G J to a matrix, G the derivative of body b's wrench by its twist."""
+    path, n, h = equation.path(p, b), equation.path_length(p)[b], equation.numbers(p).h
+    wrench = doubles(stack_doubles(6), 6)
+    for k in range(n):
+        linear_algebra.multiply(g, equation.motion(p, b, k), wrench)
+        for r in range(6):
+            wrench[r] *= -h
+        for i in range(n):
+            a[path[i], path[k]] += linear_algebra.dot(equation.motion(p, b, i), wrench)
 
 
 @exact
 def _linearise(p, which):
     """Fill `equation.linear` with M - h J' G J, G the sand's derivatives; with M for NONE."""
-    h, a = equation.numbers(p).h, equation.linear(p)
-    linear_algebra.copy_matrix(equation.mass(p), a)
+    a = equation.linear(p)
+    sparse.copy(p, equation.mass(p), a)
     if which == NONE:
         return
-    column = equation.column(p)
     for b in range(equation.head(p).nbody):
-        j, g = equation.jacobian(p, b), _derivative(p, which, b)
-        for r in range(6):
-            if _is_zero(g, r):
-                continue
-            for k in range(column.size):
-                column[k] = 0.0
-            for c in range(6):
-                y = -h * g[r, c]
-                for k in range(column.size):
-                    column[k] += y * j[c, k]
-            linear_algebra.add_outer(a, j[r], column, 1.0)
+        if which == COMPLETED or equation.kept(p, b).known > 0.0:
+            _add_derivative(p, b, _derivative(p, which, b), a)
 
 
 @exact
 def _factor_with_rows(p, x, force):
     """Factor `equation.linear` with the rows' stiffness at x."""
     a = equation.linear_factors(p)
-    linear_algebra.copy_matrix(equation.linear(p), a)
+    sparse.copy(p, equation.linear(p), a)
     if equation.head(p).nrow > 0:
         constraint_rows.add_stiffness(p, x, force, a)
-    linear_algebra.factor(a, equation.linear_order(p))
+    sparse.factor(p, a)
 
 
 @exact
@@ -67,11 +64,11 @@ def solution(p, v, residual, which, out):
     """Fill out with the velocity that solves the equation for the sand's force linearised at v, the rows exactly."""
     _linearise(p, which)
     if equation.head(p).nrow > 0:
-        _solve_with_rows(p, v, residual, out)
+        _solve_with_rows(p, v, residual, which, out)
         return
     direction, nothing = equation.direction(p), equation.missing(p)
     _factor_with_rows(p, nothing, nothing)
-    linear_algebra.substitute(equation.linear_factors(p), equation.linear_order(p), residual, direction)
+    sparse.substitute(p, equation.linear_factors(p), residual, direction)
     for k in range(v.size):
         out[k] = v[k] - direction[k]
 
@@ -88,28 +85,29 @@ def _begin_with_rows(p, v, residual, out):
         missing[k] = residual[k]
     constraint_rows.accelerations(p, change, x)
     constraint_rows.forces(p, x, force)
-    linear_algebra.add_transposed(equation.row_jacobian(p), force, h, fixed)
+    constraint_rows.add_forces(p, force, h, fixed)
 
 
 @exact
-def _solve_with_rows(p, v, residual, out):
+def _solve_with_rows(p, v, residual, which, out):
     """Newton's method on the rows, each step to where the missing impulse along it vanishes."""
     _begin_with_rows(p, v, residual, out)
     h = equation.numbers(p).h
     x, force, moved = equation.row_error(p), equation.row_force(p), equation.row_moved(p)
     change, fixed, missing = equation.change(p), equation.fixed(p), equation.missing(p)
     direction = equation.direction(p)
-    target = 1e-16 * (linear_algebra.dot(residual, residual) + TINY)
+    first = True
+    target = EXACTNESS[which] * (linear_algebra.dot(residual, residual) + TINY)
     for _ in range(ITERATIONS):
-        _factor_with_rows(p, x, force)
-        linear_algebra.substitute(equation.linear_factors(p), equation.linear_order(p), missing, direction)
+        if constraint_rows.note_zones(p, x) or first:
+            _factor_with_rows(p, x, force)
+        first = False
+        sparse.substitute(p, equation.linear_factors(p), missing, direction)
         for k in range(v.size):
             direction[k] = -direction[k]
-        linear_algebra.multiply(equation.linear(p), direction, change)
+        sparse.multiply(p, equation.linear(p), direction, change)
         stiff, slope = linear_algebra.dot(direction, change), linear_algebra.dot(direction, fixed)
-        linear_algebra.multiply(equation.row_acceleration(p), direction, moved)
-        for i in range(moved.size):
-            moved[i] /= h
+        constraint_rows.changes(p, direction, moved)
         t = _crossing(p, slope, stiff)
         for k in range(v.size):
             out[k] += t * direction[k]
@@ -118,7 +116,7 @@ def _solve_with_rows(p, v, residual, out):
         for i in range(x.size):
             x[i] += t * moved[i]
         constraint_rows.forces(p, x, force)
-        linear_algebra.add_transposed(equation.row_jacobian(p), force, -h, missing)
+        constraint_rows.add_forces(p, force, -h, missing)
         if linear_algebra.dot(missing, missing) <= target:
             break
 
@@ -127,20 +125,19 @@ def _solve_with_rows(p, v, residual, out):
 def _along(p, slope, stiff, t):
     """Missing impulse along `equation.direction` after a share t of it; slope and stiff are what is not the rows'."""
     x, moved, tried, force = equation.row_error(p), equation.row_moved(p), equation.row_tried(p), equation.row_force(p)
-    h, j, direction = equation.numbers(p).h, equation.row_jacobian(p), equation.direction(p)
+    h, share = equation.numbers(p).h, equation.row_share(p)
     for i in range(x.size):
         tried[i] = x[i] + t * moved[i]
     constraint_rows.forces(p, tried, force)
-    total = slope + t * stiff
-    for i in range(x.size):
-        if force[i] != 0.0:
-            total -= h * force[i] * linear_algebra.dot(j[i], direction)
-    return total
+    return slope + t * stiff - h * linear_algebra.dot(force, share)
 
 
 @exact
 def _crossing(p, slope, stiff):
     """The share t of `equation.direction`, at most one, after which the missing impulse along it vanishes."""
+    share, direction = equation.row_share(p), equation.direction(p)
+    for i in range(share.size):
+        share[i] = constraint_rows.product(p, i, direction)
     low, at_low = 0.0, _along(p, slope, stiff, 0.0)
     high, at_high = 1.0, _along(p, slope, stiff, 1.0)
     if at_high <= 1e-6 * abs(at_low) or at_low >= 0.0:

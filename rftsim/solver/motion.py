@@ -11,25 +11,31 @@ from rftsim.machine.memory import doubles, stack_doubles
 from rftsim.solver import equation, linear_algebra
 
 
-@exact
+@fast
 def twist_of(p, b, v, out):
     """Fill out with the twist of body b at a generalised velocity, (6,)."""
-    linear_algebra.multiply(equation.jacobian(p, b), v, out)
+    path, a, c, d, e, f, g = equation.path(p, b), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for k in range(equation.path_length(p)[b]):
+        y, j = v[path[k]], equation.motion(p, b, k)
+        a, c, d = a + j[0] * y, c + j[1] * y, d + j[2] * y
+        e, f, g = e + j[3] * y, f + j[4] * y, g + j[5] * y
+    out[0], out[1], out[2], out[3], out[4], out[5] = a, c, d, e, f, g
 
 
-@fast
-def speed_of(p, b, v, lengths=1.0):
-    """|velocity| + |angular velocity| times so many lengths of body b, at a generalised velocity [m/s]."""
-    j, length = equation.jacobian(p, b), equation.length(p)[b]
-    square, total = 0.0, 0.0
-    for r in range(6):
-        y = 0.0
-        for k in range(v.size):
-            y += j[r, k] * v[k]
-        square += y * y
-        if r == 2:
-            total, square = np.sqrt(square), 0.0
-    return total + lengths * length * np.sqrt(square)
+@exact
+def size_of(twist, length):
+    """|velocity| + |angular velocity| times a length [m/s]."""
+    u, w = twist[:3], twist[3:]
+    speed, rate = u[0] * u[0] + u[1] * u[1] + u[2] * u[2], w[0] * w[0] + w[1] * w[1] + w[2] * w[2]
+    return np.sqrt(speed) + length * np.sqrt(rate)
+
+
+@exact
+def speed_of(p, b, v):
+    """The size of body b's twist at a generalised velocity [m/s]."""
+    twist = doubles(stack_doubles(6), 6)
+    twist_of(p, b, v, twist)
+    return size_of(twist, equation.length(p)[b])
 
 
 @exact
@@ -38,13 +44,20 @@ def frame_at(p, b, twist):
     return step_frame.moving(equation.frame(p, b).ctypes.data, equation.rotation(p, b), twist)
 
 
+@fast
+def add_wrench(p, b, wrench, share, out):
+    """Add a share of a wrench on body b to a generalised force."""
+    path = equation.path(p, b)
+    for k in range(equation.path_length(p)[b]):
+        out[path[k]] += share * linear_algebra.dot(equation.motion(p, b, k), wrench)
+
+
 @exact
 def generalised(p, k, later, out):
-    """Fill out with the generalised force of the wrenches of point k, (nv,)."""
-    for i in range(out.size):
-        out[i] = 0.0
+    """Fill out with the generalised force of the wrenches of point k, (ndof,)."""
+    linear_algebra.clear(out)
     for b in range(equation.head(p).nbody):
-        linear_algebra.add_transposed(equation.jacobian(p, b), equation.wrench_of(p, k, b, later), 1.0, out)
+        add_wrench(p, b, equation.wrench_of(p, k, b, later), 1.0, out)
 
 
 @exact
@@ -62,13 +75,12 @@ def evaluate(p, v, k):
 
 
 @exact
-def differentiate(p, v, completed):
-    """Evaluate the derivative of each body's wrench by its twist: the exact one (0.0), or the completed one (1.0)."""
+def differentiate(p, b, v, completed):
+    """Evaluate the derivative of body b's wrench by its twist: the exact one (0.0), or the completed one (1.0)."""
     twist = doubles(stack_doubles(6), 6)
     sand, v_c = equation.head(p).sand, equation.numbers(p).v_c
-    for b in range(equation.head(p).nbody):
-        twist_of(p, b, v, twist)
-        f, r = equation.frame(p, b).ctypes.data, equation.rotation(p, b).ctypes.data
-        g = equation.completed(p, b) if completed > 0.0 else equation.derivative(p, b)
-        exports.derivative(sand, equation.surface(p)[b], f, r, twist.ctypes.data, v_c, completed, g.ctypes.data)
-    equation.work(p).derivatives += 1.0
+    twist_of(p, b, v, twist)
+    f, r = equation.frame(p, b).ctypes.data, equation.rotation(p, b).ctypes.data
+    g = equation.completed(p, b) if completed > 0.0 else equation.derivative(p, b)
+    exports.derivative(sand, equation.surface(p)[b], f, r, twist.ctypes.data, v_c, completed, g.ctypes.data)
+    equation.work(p).derivatives += 1.0 / equation.head(p).nbody

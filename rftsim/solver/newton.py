@@ -24,22 +24,37 @@ from rftsim.machine.memory import doubles, stack_doubles
 from rftsim.solver import equation, linear_algebra, linearised, residual
 from rftsim.solver.centring import centre
 from rftsim.solver.equation import POINT
-from rftsim.solver.motion import differentiate, generalised, speed_of, twist_of
-from rftsim.solver.residual import attempt, copy_point
+from rftsim.solver.motion import add_wrench, differentiate, generalised, size_of, speed_of, twist_of
+from rftsim.solver.residual import allowed, attempt, copy_point
 
 V_C: Final = 3e-7
 """Least speed v_c [m/s] below which a triangle's stress falls to zero; where all is at rest, bodies creep slower."""
 CREEP: Final = 1e-4
 """v_c over the speed of the fastest body. A body at rest amid moving ones, loaded to near what the sand bears, is the
 hardest of all to solve for, and is so less often."""
-MOST: Final = 40
-"""Iterations of one solution."""
+KEPT_LEAVES: Final = 0.3
+FRESH_LEAVES: Final = 0.1
+LEAST_LEFT: Final = 0.02
+"""Share of the missing impulse that a step is thought to leave: of a kept derivative, of one that was just taken, and
+at least, where the last step showed it."""
+FORCE: Final = 2.0
+"""Missing impulse that is allowed, over all impulses and the tolerance."""
+PATIENCE: Final = 6.0
+"""Iterations after which the tolerance is loosened."""
 LOOSEST: Final = 20.0
-"""Factor to which the tolerance is loosened, from the sixth iteration on."""
+"""Factor to which that is."""
+BUDGET: Final = 60.0
+"""Evaluations' worth of one step of all bodies."""
+DERIVATIVE: Final = 2.0
+"""Evaluations that a derivative is worth."""
+RESERVE: Final = 4.0
+"""Evaluations' worth that is left unspent by one solution, for what follows it."""
 NEAR: Final = 0.25
 """Square of the share of a body's speed that is left where a step is said to pass its rest."""
 BESIDE: Final = 0.3
 """Speed, over v_c, at which a body is tried beside its rest."""
+POOR: Final = 0.2
+"""Share of the largest misfit from which on a body's derivative is taken anew."""
 
 
 @entry(types.void, address)
@@ -47,48 +62,89 @@ def solve(p):
     """Solve the equation: fill `end` and its numbers, leave the velocity and its wrenches in point POINT.best."""
     _begin(p)
     progress, best = equation.progress(p), equation.scores(p, POINT.best)
-    while best.error > progress.loosened and progress.iteration < MOST:
-        progress.iteration += 1.0
-        if progress.iteration > 6.0:
-            progress.loosened = min(1.5 * progress.loosened, LOOSEST)
-        if progress.iteration > 10.0 and best.missing < 5e-3 * best.scale:  # a face on its edge: nothing is closer
-            break
+    accepted = False
+    while not accepted:
         if progress.shortened == 0.0:
             _choose_direction(p)
+            accepted = _is_short(p)
+        if accepted or _is_given_up(p):
+            break
+        progress.iteration += 1.0
+        if progress.iteration > PATIENCE:
+            progress.loosened = min(1.5 * progress.loosened, LOOSEST)
         _try_along(p, equation.search(p), progress.share, POINT.new)
         _keep_best(p, POINT.new)
         if not _is_refused(p):
             _accept(p)
-    numbers = equation.numbers(p)
-    numbers.knows_derivative = progress.knows_derivative
-    numbers.solved = 1.0 if best.error <= LOOSEST or best.missing <= 1e-2 * best.scale else 0.0
-    centre(p)
+    if accepted:
+        copy_point(p, POINT.now, POINT.best)
+    near = best.error <= LOOSEST or best.missing <= 1e-2 * best.scale
+    equation.numbers(p).solved = 1.0 if accepted or near else 0.0
+    centre(p, accepted)
+
+
+@exact
+def worth(p):
+    """The evaluations' worth of what was spent on the step so far."""
+    spent = equation.work(p)
+    return spent.evaluations + DERIVATIVE * spent.derivatives
+
+
+@exact
+def _is_given_up(p):
+    """Whether the solution ends at its best point: too many iterations, or a face on its edge: nothing is nearer."""
+    progress, best = equation.progress(p), equation.scores(p, POINT.best)
+    if progress.iteration >= equation.numbers(p).iterations or worth(p) > BUDGET - RESERVE - DERIVATIVE:
+        return True
+    return progress.iteration > PATIENCE and (best.error <= progress.loosened or best.missing < 5e-3 * best.scale)
 
 
 @exact
 def _begin(p):
-    """Set the equation's scales, and evaluate it where the kept derivative leads, or at the last velocity."""
-    numbers, progress, last = equation.numbers(p), equation.progress(p), equation.last(p)
-    numbers.impulse, numbers.v_c = numbers.h * residual.size(p, equation.force(p)), V_C
+    """Set the equation's scales, and evaluate it where the kept derivatives lead, or at the last velocity."""
+    numbers, progress = equation.numbers(p), equation.progress(p)
+    numbers.scale, numbers.v_c = numbers.h * residual.size(p, equation.force(p)), V_C
+    progress.is_stale, known = 0.0, True
     for b in range(equation.head(p).nbody):
         numbers.v_c = max(numbers.v_c, CREEP * speed_of(p, b, equation.start(p)))
-    progress.knows_derivative = numbers.knows_derivative
-    progress.is_stale = progress.is_fresh = progress.by_secant = 0.0
-    progress.secants_left = progress.shortened = progress.failures = progress.iteration = 0.0
+        equation.is_fresh(p)[b], equation.misfit(p)[b] = 0.0, 0.0
+        known = known and equation.kept(p, b).known > 0.0
+    progress.by_secant = progress.secants_left = progress.shortened = progress.failures = progress.iteration = 0.0
     progress.loosened = progress.share = 1.0
-    missing = equation.residual_of(p, POINT.now)
-    residual.fill(p, last, equation.foreseen(p), missing)
-    which = linearised.EXACT if numbers.knows_derivative > 0.0 else linearised.NONE
-    linearised.solution(p, last, missing, which, equation.velocity_of(p, POINT.now))
+    progress.contraction = KEPT_LEAVES
+    _predict(p)
     attempt(p, POINT.now)
     now, new = equation.scores(p, POINT.now), equation.scores(p, POINT.new)
-    if now.error > 1.0 and now.missing > 0.3 * now.scale:  # a poor guess: is the last velocity nearer?
-        linear_algebra.copy(last, equation.velocity_of(p, POINT.new))
+    if not known:
+        progress.is_stale = 1.0
+    elif now.error > 1.0 and now.missing > 0.3 * now.scale:  # a poor guess: is the start nearer?
+        linear_algebra.copy(equation.start(p), equation.velocity_of(p, POINT.new))
         attempt(p, POINT.new)
+        progress.is_stale = 1.0
         if new.missing < now.missing:
             copy_point(p, POINT.new, POINT.now)
-            progress.is_stale = 1.0
     copy_point(p, POINT.now, POINT.best)
+
+
+@exact
+def _predict(p):
+    """Fill the velocity of POINT.now with the solution for the kept forces, linear in each body's twist."""
+    start, q, missing = equation.start(p), equation.sand_force(p), equation.residual_of(p, POINT.now)
+    twist, wrench = doubles(stack_doubles(6), 6), doubles(stack_doubles(6), 6)
+    linear_algebra.clear(q)
+    for b in range(equation.head(p).nbody):
+        kept = equation.kept(p, b)
+        if kept.known == 0.0:
+            continue
+        twist_of(p, b, start, twist)
+        for r in range(6):
+            twist[r] -= kept.twist[r]
+        linear_algebra.multiply(equation.derivative(p, b), twist, wrench)
+        for r in range(6):
+            wrench[r] += kept.wrench[r]
+        add_wrench(p, b, wrench, 1.0, q)
+    residual.fill(p, start, q, missing)
+    linearised.solution(p, start, missing, linearised.EXACT, equation.velocity_of(p, POINT.now))
 
 
 @exact
@@ -97,17 +153,51 @@ def _choose_direction(p):
     progress, v = equation.progress(p), equation.velocity_of(p, POINT.now)
     progress.by_secant = 1.0 if progress.secants_left > 0.0 else 0.0
     if progress.by_secant > 0.0:
-        differentiate(p, v, 1.0)
+        for b in range(equation.head(p).nbody):
+            differentiate(p, b, v, 1.0)
         progress.secants_left -= 1.0
-    elif progress.is_fresh == 0.0 and (progress.is_stale > 0.0 or progress.knows_derivative == 0.0):
-        differentiate(p, v, 0.0)
-        progress.knows_derivative, progress.is_fresh, progress.is_stale = 1.0, 1.0, 0.0
+    elif progress.is_stale > 0.0:
+        _refresh(p)
     which = linearised.COMPLETED if progress.by_secant > 0.0 else linearised.EXACT
     direction = equation.search(p)
     linearised.solution(p, v, equation.residual_of(p, POINT.now), which, direction)
     for k in range(v.size):
         direction[k] -= v[k]
     progress.share = 1.0
+
+
+@exact
+def _refresh(p):
+    """Take the derivatives anew that are unknown, or that foresaw the last change of force worst; else all."""
+    v, misfit, fresh, largest = equation.velocity_of(p, POINT.now), equation.misfit(p), equation.is_fresh(p), 0.0
+    for b in range(fresh.size):
+        if equation.kept(p, b).known == 0.0:
+            misfit[b] = 1e300
+        largest = max(largest, misfit[b] if fresh[b] == 0.0 else 0.0)
+    for b in range(fresh.size):
+        if fresh[b] == 0.0 and (misfit[b] >= POOR * largest):
+            differentiate(p, b, v, 0.0)
+            fresh[b], misfit[b], equation.kept(p, b).known = 1.0, 0.0, 1.0
+    equation.progress(p).is_stale = 0.0
+    equation.progress(p).contraction = FRESH_LEAVES
+
+
+@exact
+def _is_short(p):
+    """Whether the direction at hand is so short that it leads to the solution, as near as is asked for."""
+    progress, now, direction = equation.progress(p), equation.scores(p, POINT.now), equation.search(p)
+    if progress.by_secant > 0.0:
+        return False
+    left, loosened = progress.contraction, progress.loosened
+    if left * now.missing > FORCE * loosened * equation.numbers(p).tolerance * now.scale:
+        return False
+    there = equation.there(p)
+    for k in range(there.size):
+        there[k] = equation.velocity_of(p, POINT.now)[k] + direction[k]
+    for b in range(equation.head(p).nbody):
+        if not left * speed_of(p, b, direction) <= loosened * allowed(p, b, there):
+            return False
+    return True
 
 
 @exact
@@ -147,18 +237,27 @@ def _shorten(p, crossing):
 
 
 @exact
+def _all_fresh(p):
+    """Whether all derivatives are those at the present point."""
+    fresh, found = equation.is_fresh(p), True
+    for b in range(fresh.size):
+        found = found and fresh[b] > 0.0
+    return found
+
+
+@exact
 def _arrange_other(p, crossing):
     """After a step that led nowhere: a derivative of now, beside a body's rest, less of it, or the completed one."""
     progress, now = equation.progress(p), equation.scores(p, POINT.now)
-    if progress.is_fresh == 0.0:
+    if not _all_fresh(p):
         progress.is_stale, progress.shortened = 1.0, 0.0
         return
     rest = _rest_along(p, equation.search(p), progress.share) if progress.shortened == 0.0 else 0.0
     if rest > 0.0:
         _try_along(p, equation.search(p), rest, POINT.new)
-        copy_point(p, POINT.new, POINT.now)
-        _keep_best(p, POINT.now)
-        progress.is_stale, progress.is_fresh, progress.shortened = 1.0, 0.0, 0.0
+        _keep_best(p, POINT.new)
+        _move(p)
+        progress.is_stale, progress.shortened = 1.0, 0.0
     elif now.missing < 0.5 * now.scale and progress.shortened < 2.0:  # a face changes its side along the way
         _shorten(p, crossing)
     else:
@@ -174,10 +273,18 @@ def _accept(p):
     if progress.by_secant > 0.0:
         progress.is_stale = 1.0
     else:
-        progress.is_stale = 1.0 if new.missing > 0.3 * now.missing else 0.0
+        left = new.missing / now.missing
+        progress.is_stale = 1.0 if left > 0.3 else 0.0
+        progress.contraction = min(max(left, LEAST_LEFT), 1.0)
         _update(p, POINT.now, POINT.new)
-    progress.is_fresh = 0.0
+    _move(p)
+
+
+@exact
+def _move(p):
+    """Make the new point the present one."""
     copy_point(p, POINT.new, POINT.now)
+    linear_algebra.clear(equation.is_fresh(p))
 
 
 @exact
@@ -191,27 +298,27 @@ def _try_along(p, direction, t, k):
 
 @exact
 def _update(p, old, new):
-    """Broyden's rank-one update of each body's derivative from two points."""
-    moved, twist = doubles(stack_doubles(6), 6), doubles(stack_doubles(6), 6)
-    v, u = equation.velocity_of(p, old), equation.velocity_of(p, new)
+    """Broyden's rank-one update of each body's derivative from two points; what they did not foresee."""
+    moved, twist, missed = doubles(stack_doubles(6), 6), doubles(stack_doubles(6), 6), doubles(stack_doubles(6), 6)
     for b in range(equation.head(p).nbody):
-        twist_of(p, b, u, moved)
-        twist_of(p, b, v, twist)
+        twist_of(p, b, equation.velocity_of(p, new), moved)
+        twist_of(p, b, equation.velocity_of(p, old), twist)
         length, square = equation.length(p)[b], 0.0
         for r in range(6):
             moved[r] -= twist[r]
-            square += (1.0 if r < 3 else length * length) * moved[r] * moved[r]
+            moved[r] *= 1.0 if r < 3 else length
+            square += moved[r] * moved[r]
         if square <= 0.0:
             continue
         g = equation.derivative(p, b)
         before, after = equation.wrench_of(p, old, b, 0), equation.wrench_of(p, new, b, 0)
         for r in range(6):
-            y = after[r] - before[r]
+            missed[r] = after[r] - before[r]
             for k in range(6):
-                y -= g[r, k] * moved[k]
-            y /= square
+                missed[r] -= g[r, k] * moved[k] / (1.0 if k < 3 else length)
             for k in range(6):
-                g[r, k] += y * (1.0 if k < 3 else length * length) * moved[k]
+                g[r, k] += missed[r] / square * (1.0 if k < 3 else length) * moved[k]
+        equation.misfit(p)[b] = size_of(missed, 1.0 / length)
 
 
 @exact
@@ -252,7 +359,7 @@ def _rest_along(p, direction, share):
             there[k] = v[k] + t * share * direction[k]
         generalised(p, POINT.now, 0, q)
         wrench = equation.wrench_of(p, POINT.now, b, 0)
-        linear_algebra.add_transposed(equation.jacobian(p, b), wrench, -1.0, q)
+        add_wrench(p, b, wrench, -1.0, q)
         residual.fill(p, there, q, missing)
         side = 1.0 if linear_algebra.dot(missing, direction) < 0.0 else -1.0
         found = max(t + side * BESIDE * equation.numbers(p).v_c / np.sqrt(square), 1e-12)

@@ -3,29 +3,24 @@
 from typing import Final
 
 from rftsim.law import step_frame, sums
-from rftsim.law.body import body_at
-from rftsim.law.exports import deepest_corner
-from rftsim.law.free_surface import after
-from rftsim.machine.compiling import exact
+from rftsim.law.body import bed_at, body_at, header_at
+from rftsim.law.frame import level_frame
+from rftsim.law.free_surface import after, lowest_depth
+from rftsim.machine.compiling import exact, inline
 from rftsim.machine.memory import doubles, stack_doubles
 from rftsim.solver import equation
-from rftsim.solver.motion import frame_at, speed_of, twist_of
+from rftsim.solver.motion import frame_at, twist_of
 
 FALL: Final = 30.0
 """Acceleration that bodies are watched for on their way to the sand [m/s^2]."""
 
 
-@exact
-def is_near(p):
-    """Whether any triangle can be in the sand within the step."""
-    v, h, twist = equation.velocity(p), equation.numbers(p).timestep, doubles(stack_doubles(6), 6)
-    for k in range(6):
-        twist[k] = 0.0
-    for b in range(equation.head(p).nbody):
-        depth = deepest_corner(equation.surface(p)[b], frame_at(p, b, twist))
-        if depth + h * (speed_of(p, b, v, 2.0) + h * FALL) > 0.0:
-            return True
-    return False
+@inline
+def is_near(sand, surface, xpos, xmat, speed, h):
+    """Whether any triangle can be in the sand within a step: by a body's bounding box and the size of its twist."""
+    bed, header = bed_at(sand), header_at(surface)
+    frame = level_frame(bed, xpos, xmat, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    return lowest_depth(header.lowest, header.highest, frame) + h * (speed + h * FALL) > 0.0
 
 
 @exact

@@ -6,56 +6,95 @@ sub-cycled path ends. MuJoCo's velocity is the mean one of that path; what it la
 next step.
 """
 
+from typing import Final
+
+import numpy as np
+
 from rftsim.machine.compiling import exact
-from rftsim.solver import constraint_rows, equation, linear_algebra, state
+from rftsim.solver import constraint_rows, equation, linear_algebra, sparse
 from rftsim.solver.equation import KIND, POINT
-from rftsim.solver.motion import generalised
-from rftsim.solver.newton import solve
-from rftsim.solver.sinking import sink
+from rftsim.solver.motion import generalised, speed_of, twist_of
+from rftsim.solver.newton import BUDGET, RESERVE, solve, worth
+from rftsim.solver.sinking import deepest, sink
 from rftsim.solver.step_equation import answer_to, force_to, prepare, reset
+
+FINENESS: Final = 1.7
+"""Error of the position in a step, over the depth and the tolerance, above which the step is split."""
+SHALLOWEST: Final = 1e-4
+"""Depth [m] below which none is resolved."""
+PART_COSTS: Final = 3.0
+"""Evaluations' worth of a part, about."""
+MORE: Final = 2.0
+"""Factor to which a step is split finer than was foreseen, where a part of it asks for that."""
+
+
+@exact
+def parts_needed(p, time):
+    """Into how many parts a step must be split, by the solution of a time of it in point POINT.best."""
+    h = equation.numbers(p).timestep
+    after, start = equation.velocity_of(p, POINT.best), equation.start(p)
+    grown, late, stopped = equation.grown(p), equation.late(p), equation.stopped(p)
+    generalised(p, POINT.best, 1, grown)
+    generalised(p, POINT.best, 0, late)
+    for k in range(after.size):
+        grown[k] = time * (grown[k] - late[k])
+        stopped[k] = after[k] - start[k]
+    sparse.substitute(p, equation.mass_factors(p), grown, late)
+    worst, fineness = 0.0, FINENESS * equation.numbers(p).tolerance
+    for b in range(equation.head(p).nbody):
+        travel = time * speed_of(p, b, start)
+        error = min(time * max(speed_of(p, b, late), speed_of(p, b, stopped)) / 8.0, travel)
+        if error <= fineness * SHALLOWEST:
+            continue
+        depth = deepest(p, b, after, time)
+        if depth <= 0.0:
+            continue
+        allowed = fineness * max(depth, SHALLOWEST)
+        worst = max(worst, error / allowed)
+        if equation.numbers(p).started == 0.0 and travel > allowed:
+            worst = max(worst, 3.9)
+    return np.ceil(np.sqrt(worst) * h / time) if worst > (time / h) ** 2 else 1.0
 
 
 @exact
 def split_step(p, parts):
-    """Take the step in parts, and shorter ones where the equation of one is not solved."""
+    """Take the step in parts, and shorter ones where the equation of one is not solved, as far as evaluations last."""
     h, end = equation.numbers(p).timestep, equation.end(p)
     drift = _begin(p)
-    part, done = h / parts, 0.0
+    part, done, needed = h / parts, 0.0, 1.0
     while done < h * (1.0 - 1e-9):
-        part = min(part, h - done)
+        left = BUDGET - RESERVE - worth(p)
+        part = min(max(part, (h - done) / max(left / PART_COSTS, 1.0)), h - done)
         if h - done - part < 0.3 * part:
             part = h - done
         _solve_part(p, drift, part)
         if equation.numbers(p).solved == 0.0:
-            if part > h / (8.0 * parts):
+            if part > h / (8.0 * parts) and worth(p) < 0.5 * BUDGET:
                 part *= 0.25
                 continue
             equation.work(p).unsolved += 1.0
+        needed = max(needed, parts_needed(p, part))
         _add_contacts(p, part / h, equation.touched(p))
         sink(p, end, part)
-        generalised(p, POINT.best, 1, equation.foreseen(p))
         _add_part(p, part)
         drift, done = part, done + part
-        part = min(2.0 * part, h / parts)
+        part = min(2.0 * part, h / min(max(parts, needed), MORE * parts))
+    equation.numbers(p).drift, equation.numbers(p).parts = drift, needed
     _end(p)
-    state.flags_at(equation.head(p).new).drift = drift
 
 
 @exact
 def _begin(p):
     """Set all means to zero; the drift before the first part [s]."""
     mean, moved, touched = equation.mean_velocity(p), equation.moved(p), equation.touched(p)
-    foreseen, wrench = equation.foreseen(p), equation.all_wrenches(p)
     for k in range(mean.size):
-        foreseen[k] = mean[k] = moved[k] = touched[k] = 0.0
-    for k in range(wrench.size):
-        wrench[k] = 0.0
-    equation.numbers(p).knows_derivative = 0.0
+        mean[k] = moved[k] = touched[k] = 0.0
+    linear_algebra.clear(equation.all_wrenches(p))
     # a velocity that was set by hand belongs to the start of the step, and MuJoCo's own to half a drift before it
-    before = state.flags_at(equation.head(p).before)
-    if before.split > 0.0:
-        return before.drift
-    return equation.numbers(p).timestep if before.started > 0.0 else 0.0
+    numbers = equation.numbers(p)
+    if numbers.drift > 0.0:
+        return numbers.drift
+    return numbers.timestep if numbers.started > 0.0 else 0.0
 
 
 @exact
@@ -65,16 +104,17 @@ def _solve_part(p, drift, part):
     start, v, kicked, moved = equation.start(p), equation.velocity(p), equation.kicked(p), equation.moved(p)
     for k in range(kicked.size):
         kicked[k] = start[k] - v[k]
-    reference, first, j = equation.row_reference(p), equation.first_reference(p), equation.row_jacobian(p)
+    reference, first = equation.row_reference(p), equation.first_reference(p)
     damping, spring = equation.row_damping(p), equation.row_spring(p)
     for i in range(reference.size):
-        damped, sprung = linear_algebra.dot(j[i], kicked), linear_algebra.dot(j[i], moved)
+        damped, sprung = constraint_rows.product(p, i, kicked), constraint_rows.product(p, i, moved)
         reference[i] = first[i] - damping[i] * damped - spring[i] * sprung
     force, smooth = equation.force(p), equation.smooth_force(p)
-    linear_algebra.multiply(equation.drag(p), kicked, force)
-    for k in range(force.size):
-        force[k] = smooth[k] - force[k]
-    linear_algebra.copy(start, equation.last(p))
+    linear_algebra.copy(smooth, force)
+    if equation.numbers(p).dragged > 0.0:
+        sparse.multiply(p, equation.drag(p), kicked, force)
+        for k in range(force.size):
+            force[k] = smooth[k] - force[k]
     solve(p)
 
 
@@ -91,12 +131,13 @@ def _add_part(p, part):
         now, wrench = equation.wrench_of(p, POINT.best, b, 0), equation.wrench(p, b)
         for k in range(6):
             wrench[k] += now[k] * (part / h)
+    remember(p)
 
 
 @exact
 def _end(p):
-    """Find the force whose step ends where the parts have led, and fill the new state."""
-    true_end, answer, q = equation.true_end(p), equation.end(p), equation.out(p)
+    """Find the force whose step ends where the parts have led."""
+    true_end, answer, q = equation.true_end(p), equation.after(p), equation.out(p)
     linear_algebra.copy(equation.start(p), true_end)
     reset(p)
     has_contacts = _leave_to_mujoco(p, equation.touched(p))
@@ -105,7 +146,7 @@ def _end(p):
     force_to(p, answer, q)
     if has_contacts:
         answer_to(p, q, answer)
-    finish(p, equation.foreseen(p), true_end, answer, 1.0)
+    finish(p, true_end)
 
 
 @exact
@@ -122,7 +163,7 @@ def _add_contacts(p, share, out):
     for i in range(x.size):
         if kind[i] < KIND.contact:
             force[i] = 0.0
-    linear_algebra.add_transposed(equation.row_jacobian(p), force, share, out)
+    constraint_rows.add_forces(p, force, share, out)
 
 
 @exact
@@ -142,24 +183,20 @@ def _leave_to_mujoco(p, touched):
 
 
 @exact
-def finish(p, foreseen, true_end, after, split):
-    """Fill the new state, of a step that was split or not.
+def remember(p):
+    """Keep each body's force at the end of the solution at hand, at the later depths, for the next one."""
+    end = equation.end(p)
+    for b in range(equation.head(p).nbody):
+        kept = equation.kept(p, b)
+        twist_of(p, b, end, kept.twist)
+        linear_algebra.copy(equation.wrench_of(p, POINT.best, b, 1), kept.wrench)
 
-    Args:
-        p: The equation, whose solution is in point POINT.best.
-        foreseen: The sand's generalised force foreseen for the next step, (nv,).
-        true_end: The true velocity at the end, (nv,).
-        after: MuJoCo's velocity there, (nv,).
-        split: Whether the step was split, 0.0 or 1.0.
-    """
-    new = equation.state(p, equation.head(p).new)
-    linear_algebra.copy(foreseen, state.foreseen(new))
-    linear_algebra.copy(equation.velocity_of(p, POINT.best), state.last(new))
-    lacking = state.lacking(new)
+
+@exact
+def finish(p, true_end):
+    """Keep for the next step what the last part has left, and what MuJoCo's velocity lacks to the true one."""
+    lacking, after = equation.lacking(p), equation.after(p)
     for k in range(after.size):
         lacking[k] = true_end[k] - after[k]
-    linear_algebra.copy(after, state.after(new))
-    linear_algebra.copy(equation.derivatives(p), state.derivatives(new))
-    flags = state.flags_at(new.address)
-    flags.knows_force, flags.split = 1.0, split
-    flags.knows_derivative = equation.numbers(p).knows_derivative
+    for b in range(equation.head(p).nbody):
+        equation.kept(p, b).drift, equation.kept(p, b).parts = equation.numbers(p).drift, equation.numbers(p).parts

@@ -1,88 +1,51 @@
 """The state that the implicit force keeps from step to step, as numbers; all zero is "nothing known".
 
-A record of FLAGS, then four vectors of nv numbers, then each body's derivative, (6, 6).
+Whether a step was made, then nv numbers of `lacking`, then a record of KEPT for each body of the bed.
 """
 
-from typing import Any, Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
-from rftsim.law.layout import numbers_in
+from rftsim.law.layout import WRENCH, numbers_in
 from rftsim.machine.compiling import inline
 from rftsim.machine.memory import doubles
 from rftsim.machine.records import record_at
 
-FLAGS: Final = np.dtype(
-    [("started", "f8"), ("knows_force", "f8"), ("knows_derivative", "f8"), ("split", "f8"), ("drift", "f8")]
+KEPT: Final = np.dtype(
+    [
+        *(("known", "f8"), ("drift", "f8"), ("parts", "f8")),
+        *(("wrench", "f8", WRENCH), ("twist", "f8", WRENCH), ("derivative", "f8", (WRENCH, WRENCH))),
+    ]
 )
-"""Flags, and the length of the last part of a split step [s]."""
-FLAGS_NUMBERS: Final = numbers_in(FLAGS)
-DERIVATIVE: Final = 36
-"""Numbers of a body's derivative."""
+"""The sand's force on a body near where the last step ended: whether it is known; the length of the last part where
+that step was split, else zero [s], and the parts that the next one should have; the wrench that is foreseen at a
+twist, and its derivative by the twist."""
+KEPT_NUMBERS: Final = numbers_in(KEPT)
 
-flags_at = record_at(FLAGS)
-"""The flags of the state at an address."""
-
-
-class State(NamedTuple):
-    """A state, of nbody bodies in the sand and nv degrees of freedom."""
-
-    address: Any
-    nbody: Any
-    nv: Any
+kept_at = record_at(KEPT)
+"""The record KEPT at an address."""
 
 
 @inline
 def state_size(nbody, nv):
-    """Numbers that last from step to step."""
-    return FLAGS_NUMBERS + 4 * nv + DERIVATIVE * nbody
+    """Numbers that last from step to step, of a bed of so many bodies in a model of so many degrees of freedom."""
+    return 1 + nv + KEPT_NUMBERS * nbody
 
 
 @inline
-def numbers(state):
-    """All numbers of a state, (state_size,), to be copied or cleared."""
-    return doubles(state.address, state_size(state.nbody, state.nv))
+def started(address):
+    """Whether a step was made, (1,), of the state at an address."""
+    return doubles(address, 1)
 
 
 @inline
-def _vector(state, k):
-    return doubles(state.address + 8 * (FLAGS_NUMBERS + k * state.nv), state.nv)
+def lacking(address, nv):
+    """The velocity that MuJoCo's lacks to the true one after a split step, (nv,), of the state at an address."""
+    return doubles(address + 8, nv)
 
 
 @inline
-def foreseen(state):
-    """The sand's generalised force foreseen for the next step, (nv,)."""
-    return _vector(state, 0)
-
-
-@inline
-def last(state):
-    """The generalised velocity that the foreseen force belongs to, (nv,)."""
-    return _vector(state, 1)
-
-
-@inline
-def lacking(state):
-    """The velocity that MuJoCo's lacks to the true one after a split step, (nv,)."""
-    return _vector(state, 2)
-
-
-@inline
-def after(state):
-    """The generalised velocity after the step, (nv,)."""
-    return _vector(state, 3)
-
-
-@inline
-def derivatives(state):
-    """The derivatives of all bodies' wrenches by their twists, (36 nbody,)."""
-    return doubles(state.address + 8 * (FLAGS_NUMBERS + 4 * state.nv), DERIVATIVE * state.nbody)
-
-
-@inline
-def begin(state):
-    """Forget everything but that a step was made."""
-    x = numbers(state)
-    for i in range(x.size):
-        x[i] = 0.0
-    flags_at(state.address).started = 1.0
+def kept(address, nv, k):
+    """Address of the record KEPT of the k-th body of the state at an address."""
+    return address + 8 * (1 + nv + KEPT_NUMBERS * k)

@@ -1,22 +1,19 @@
 """The equation of a whole step as MuJoCo sees it, and the force that makes its step end at a given velocity."""
 
 from rftsim.machine.compiling import exact
-from rftsim.solver import equation, linear_algebra, linearised, residual
+from rftsim.solver import equation, linear_algebra, linearised, residual, sparse
 
 
 @exact
 def prepare(p, h):
-    """Set the equation's mass and its factors, its rows and its step for a time h."""
-    drag, plain, mass = equation.drag(p), equation.plain_mass(p), equation.mass(p)
-    for i in range(mass.shape[0]):
-        for k in range(mass.shape[0]):
-            mass[i, k] = plain[i, k] + h * drag[i, k]
-    linear_algebra.factor_of(mass, equation.mass_factors(p), equation.mass_order(p))
-    j, dragged, seen = equation.row_jacobian(p), equation.row_drag(p), equation.row_acceleration(p)
-    for i in range(j.shape[0]):
-        for k in range(j.shape[1]):
-            seen[i, k] = j[i, k] + h * dragged[i, k]
-    equation.numbers(p).h = h
+    """Set the equation's mass and its factors, and its step, for a time h."""
+    numbers, mass, factors = equation.numbers(p), equation.mass(p), equation.mass_factors(p)
+    numbers.h = h
+    sparse.copy(p, equation.plain_mass(p), mass)
+    if numbers.dragged > 0.0:
+        sparse.add(p, equation.drag(p), h, mass)
+    sparse.copy(p, mass, factors)
+    sparse.factor(p, factors)
 
 
 @exact
@@ -34,8 +31,7 @@ def force_to(p, velocity, out):
     h = equation.numbers(p).timestep
     linear_algebra.copy(equation.velocity(p), equation.start(p))
     unforced, nothing = equation.unforced(p), equation.nothing(p)
-    for k in range(nothing.size):
-        nothing[k] = 0.0
+    linear_algebra.clear(nothing)
     residual.fill(p, velocity, nothing, unforced)
     for k in range(out.size):
         out[k] = unforced[k] / h
