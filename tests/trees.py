@@ -28,7 +28,7 @@ def spec_of(bodies=BALL, option="", extra=""):
 def sandy(mjcf=BALL, option="", sand=SAND, law="rft3d", force="explicit", **options):
     """A compiled model with sand under it, whose force is that of the moment."""
     spec = spec_of(mjcf, option)
-    add_sand(spec, sand, law, force=force, **{"tolerance": 0.0} | options)
+    add_sand(spec, sand, law, force=force, **{"reduction": 0.0} | options)
     return spec.compile()
 
 

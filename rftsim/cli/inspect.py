@@ -13,8 +13,9 @@ from rich.table import Table
 from rftsim.cli.output import print_json, print_line
 from rftsim.cli.scene import Scene
 from rftsim.errors import RftsimError
-from rftsim.model.add_sand import Bed
+from rftsim.model.add_sand import REDUCTION, Bed
 from rftsim.model.poses import posed
+from rftsim.model.readout import instances
 from rftsim.model.standing import Tree, standing
 from rftsim.run.advice import advise
 
@@ -23,11 +24,11 @@ from rftsim.run.advice import advise
 class Inspect(Scene):
     """Show how a scene would be modelled: bodies, triangles, law, sand, and why; and how much of it the scene needs.
 
-    Example: rftsim inspect robot.xml --sand poppy-seeds --tolerance 0.01
+    Example: rftsim inspect robot.xml --sand poppy-seeds --reduction 0.01
     """
 
-    tolerance: float = 0.01
-    """Largest error of a body's wrench, from which follows how many elements it needs."""
+    reduction: float | None = None
+    """Largest error of a body's wrench, from which follows how many elements it needs; by default 0.01."""
     speed: float | None = None
     """Speed that decides on the law [m/s]; by default that of the fastest body at the start."""
     json: bool = False
@@ -37,8 +38,9 @@ class Inspect(Scene):
         """Stage the scene, whole and reduced, and print how it is modelled."""
         if self.speed is not None and not self.speed >= 0.0:
             raise RftsimError(f"the speed must be zero or more, not {self.speed:g} m/s")
-        whole, lean = self.staged(tolerance=0.0), self.staged(tolerance=self.tolerance)
-        bed = whole.bed
+        reduction = REDUCTION if self.reduction is None else self.reduction
+        whole, lean = self.staged(reduction=0.0), self.staged(reduction=reduction)
+        bed, solution = whole.bed, instances(whole.model)[0].bed
         advice = advise(lean.model, lean.bed, self.speed)
         stands = standing(whole.model, posed(whole.model, self.keyframe))
         bodies = {name: _body(bed, lean.bed, name) for name in bed.reasons}
@@ -51,9 +53,11 @@ class Inspect(Scene):
                     "sand": dataclasses.asdict(bed.sand),
                     "surface": dataclasses.asdict(bed.terrain),
                     "timestep_s": float(whole.model.opt.timestep),
+                    "tolerance": float(solution.tolerance),
+                    "iterations": int(solution.iterations),
                     "bodies": bodies,
                     "triangles": sum(surface.ntri for surface in bed.surfaces.values()),
-                    "tolerance": self.tolerance,
+                    "reduction": reduction,
                     "elements": sum(surface.ntri for surface in lean.bed.surfaces.values()),
                     "stands": [_stand(whole.model, tree) for tree in stands.trees],
                     "advice": [one._asdict() for one in advice],
@@ -66,7 +70,12 @@ class Inspect(Scene):
         console.print(f"[bold]{self.scene}[/bold]  law {bed.law.name}: {bed.law.says}", highlight=False)
         given = {k: v for k, v in dataclasses.asdict(bed.sand).items() if v not in (None, "")}
         console.print("sand  " + ", ".join(f"{k} {v:g}" if k != "source" else v for k, v in given.items()))
-        console.print(_table(bodies, self.tolerance))
+        print_line(
+            console,
+            f"implicit force: solved to {solution.tolerance:g} of a body's velocity, in {solution.iterations:g} "
+            "iterations at most",
+        )
+        console.print(_table(bodies, reduction))
         for name, row in bodies.items():
             print_line(console, f"{name}: {row['why']}")
         for tree in stands.trees:
@@ -110,8 +119,8 @@ def _stand_line(model: mujoco.MjModel, tree: Tree) -> str:
     return f"stands: {name}, {tree.weight:.4g} N, lowered by {1000 * tree.lowered:.1f} mm: {feet}"
 
 
-def _table(bodies: dict[str, dict[str, Any]], tolerance: float) -> Table:
-    table = Table("body", caption=f"needed: what --tolerance {tolerance:g} models; errors of its wrench in %")
+def _table(bodies: dict[str, dict[str, Any]], reduction: float) -> Table:
+    table = Table("body", caption=f"needed: what --reduction {reduction:g} models; errors of its wrench in %")
     for heading in ("triangles", "needed", "error", "held back", "area [m²]"):
         table.add_column(escape(heading), justify="right")
     table.add_column("wheel")

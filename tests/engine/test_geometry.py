@@ -19,7 +19,7 @@ WHEEL = """
 
 
 def bed_of(mjcf, option="", sand=SAND, law="rft3d", **options):
-    return add_sand(spec_of(mjcf, option), sand, law, **{"tolerance": 0.0} | options)
+    return add_sand(spec_of(mjcf, option), sand, law, **{"reduction": 0.0} | options)
 
 
 # Surfaces -------------------------------------------------------------------------------------------------------------
@@ -31,7 +31,7 @@ def test_surface_is_that_of_the_geoms():
     sizes = {"sphere": ".1", "box": ".1 .2 .05", "ellipsoid": ".1 .2 .05", "cylinder": ".1 .2", "capsule": ".1 .2"}
     for kind, size in sizes.items():
         spec = spec_of(f'<body name="b"><freejoint/><geom type="{kind}" size="{size}" {place}/></body>')
-        surface, model = add_sand(spec, SAND, tolerance=0.0).surfaces["b"], spec.compile()
+        surface, model = add_sand(spec, SAND, reduction=0.0).surfaces["b"], spec.compile()
         vector = surface.normals * surface.areas[:, None]
         np.testing.assert_allclose(vector.sum(axis=0), 0.0, atol=1e-12)
         volume = np.einsum("ij,ij->", surface.centres, vector) / 3.0
