@@ -28,11 +28,11 @@ from rftsim.model.floors import (
     say_ground,
 )
 from rftsim.model.geometry import Geoms, Meshes
+from rftsim.model.planar import check_planar
 from rftsim.model.readings import reading_doubts
 from rftsim.model.shaping import Fineness
 from rftsim.model.solution import check_solution
 from rftsim.model.standing import stand
-from rftsim.model.start import start
 from rftsim.model.wheels import rolling
 from rftsim.model.write import (
     Carrier,
@@ -116,7 +116,8 @@ def add_sand(
             box, mesh or height field that the model stands on at its first keyframe, or z = 0 where there is none.
         keep_floor: Leave the floors at the sand's level as they are. By default they lose their collision, and their
             contact pairs, and are hidden.
-        plane: Normal of the vertical plane of motion, for the 2D laws.
+        plane: Normal of the vertical plane of motion, for the 2D laws. Joints have to keep the bodies in it, as nothing
+            would stop them across it.
         geoms: Which geoms bound a body: those that can collide, or `all`: where it has none of these, those it has.
         meshes: `hull`: geoms of meshes are felt as the convex hulls by which MuJoCo collides with them; `exact`: as
             they are. What is open is felt as its hull, and what collides with nothing as it is.
@@ -143,7 +144,8 @@ def add_sand(
         What was modelled.
 
     Raises:
-        RftsimError: The scene cannot have sand: unknown bodies, surfaces that bound nothing, flags that would skip it.
+        RftsimError: The scene cannot have sand: unknown bodies, surfaces that bound nothing, flags that would skip it,
+            bodies that can leave the plane of a 2D law.
     """
     _check_choices(force, geoms, meshes, max_edge, reduction)
     _check_solution(tolerance, iterations)
@@ -159,24 +161,22 @@ def add_sand(
         plane=layout.record(numbers, layout.BED).plane if bed_law.planar else None,
         terrain=site.terrain if reduction and bodies is None else None,
     )
-    felt = felt_bodies(draft.model, choice)
+    felt = felt_bodies(draft.model, draft.data, choice)
+    check_planar(draft.model, draft.data, felt.surfaces, bed_law, choice.plane)
     wheeled = rolling(draft.model, felt.surfaces, wheels if isinstance(wheels, Mapping) else _names(wheels))
-    if bed_law.dynamic:
-        felt.surfaces.update(wheeled)
+    felt.surfaces.update(wheeled if bed_law.dynamic else {})
     economies = economise(draft.model, felt, numbers, reduction) if reduction else {}
-    floors = find_floors(draft.model, site.terrain, max(surface.size for surface in felt.surfaces.values()))
-    if sensors:
-        check_sensors(spec, felt.surfaces)
+    reach = max(surface.size for surface in felt.surfaces.values())
+    floors = find_floors(draft.model, draft.data, site.terrain, reach)
+    check_sensors(spec, felt.surfaces if sensors else ())
     if draw:
         check_drawing(spec, name)
-    notes = [*felt.doubts, *doubts.gravity_doubts(draft.model, bed_sand), *_doubts(draft.model, numbers, felt, floors)]
-    notes += floor_doubts(floors) if keep_floor else []
+    notes = [*_doubts(draft, bed_sand, numbers, felt, floors), *(floor_doubts(floors) if keep_floor else ())]
 
     name_bodies(spec, draft)
     carrier = Carrier(name, plugin.IMPLICIT if force == "implicit" else plugin.EXPLICIT)
     write_bed(spec, carrier, numbers, felt.surfaces)
-    if sensors:
-        write_sensors(spec, carrier, felt.surfaces)
+    write_sensors(spec, carrier, felt.surfaces if sensors else ())
     if draw:
         write_drawing(spec, name, site.terrain)
     choices = [*felt.choices, *_integrate(spec, force)]
@@ -204,7 +204,7 @@ def _site(spec: mujoco.MjSpec, draft: Draft, terrain: "FreeSurface | float | Non
         if block.SAND_MARKER in numeric.name:
             other = layout.record(np.array(numeric.data), layout.BED)
             return _Site(FreeSurface(float(other.offset / other.up[2]), tuple(other.up.tolist())), None)
-    ground = find_ground(draft.model)
+    ground = find_ground(draft.model, draft.data)
     return _Site(FreeSurface() if ground is None else ground.terrain, ground)
 
 
@@ -216,11 +216,14 @@ def _integrate(spec: mujoco.MjSpec, force: str) -> list[str]:
     return ["the integrator is implicitfast now: RK4 would take the sand's force at the velocity of the moment"]
 
 
-def _doubts(model: mujoco.MjModel, bed: Array, felt: Felt, floors: Floors) -> list[str]:
-    """The doubts about sensors of felt bodies, and those that show when the model stands in its sand."""
+def _doubts(draft: Draft, sand: Sand, bed: Array, felt: Felt, floors: Floors) -> list[str]:
+    """The doubts about surfaces, gravity and sensors, and those that show when the model stands in its sand."""
+    model = draft.model
     packed = {model.body(name).id: layout.pack_surface(surface) for name, surface in felt.surfaces.items()}
-    found = stand(model, start(model), bed, packed)
+    found = stand(model, draft.data, bed, packed)
     return [
+        *felt.doubts,
+        *doubts.gravity_doubts(model, sand),
         *reading_doubts(model, packed),
         *doubts.sinkage_doubts(model, found, felt.surfaces),
         *doubts.footprint_doubts(model, found, floors.terrain),
