@@ -239,11 +239,16 @@ def test_laws_for_a_robot(speed, law, number):
     assert number in dynamics.reason
 
 
-def test_a_flat_law_in_space_is_advised_against():
-    """A 2D law does not feel what moves across its plane."""
-    spec = spec_of()
-    bed = add_sand(spec, SAND, "rft2d", reduction=0.0)
-    assert [one.law for one in advise(spec.compile(), bed)] == ["rft3d", "rft2d"]
+@pytest.mark.parametrize(("plane", "named"), [((0, -1, 0), "x-z plane"), ((3, 4, 0), "plane of motion")])
+def test_a_flat_law_serves_in_its_own_plane(plane, named):
+    """Whatever it is: nothing that feels a 2D law can leave it."""
+    along, about = np.cross(plane, (0, 0, 1)), np.array(plane)
+    axes = [" ".join(map(str, axis)) for axis in (along, about)]
+    spec = spec_of(f'<body><joint type="slide" axis="{axes[0]}"/><joint axis="{axes[1]}"/><geom size=".1"/></body>')
+    bed = add_sand(spec, SAND, "rft2d", plane=plane)
+    dimensions, dynamics = advise(spec.compile(), bed)
+    assert (dimensions.law, dynamics.law) == ("rft2d", "rft2d")
+    assert f"in the {named}: a 2D law serves" in dimensions.reason
 
 
 def test_advice_is_written_as_json():

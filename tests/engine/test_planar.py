@@ -6,14 +6,14 @@ import pytest
 import trimesh
 from rftsim_models import hexapod, hopper, wheels
 from shapes import about
-from trees import SAND, spec_of
+from trees import JOINTS, SAND, spec_of
 
 import rftsim
 from rftsim import SceneError, add_sand
 from rftsim.run.scenes import stage
 
 BOX = '<geom type="box" size=".1 .05 .03"/>'
-PLANAR = '<joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/><joint axis="0 1 0"/>'
+PLANAR = JOINTS["planar"]
 ACROSS = (-np.sin(0.5), np.cos(0.5), 0.0)
 WELD = '<equality><weld body1="box"/></equality>'
 
