@@ -30,7 +30,7 @@ UPWARD = (-0.1, 0.0, 1.0)
 @pytest.fixture(scope="module")
 def drop(tmp_path_factory):
     """A recorded drop: the model, the file's contents, and what `rftsim` said at each frame."""
-    model = rftsim.load(DROP, terrain=rftsim.FreeSurface(0.01, UPWARD), tolerance=0.0)
+    model = rftsim.load(DROP, terrain=rftsim.FreeSurface(0.01, UPWARD), reduction=0.0)
     data, path, truth = mujoco.MjData(model), tmp_path_factory.mktemp("drop") / "drop.rrd", []
     with record.Recorder(model, path, fps=FPS) as recorder:
         while data.time < 0.8:
@@ -161,7 +161,7 @@ def test_scalars_of_the_caller(drop):
 
 @pytest.fixture(scope="module")
 def model():
-    return rftsim.load(DROP, tolerance=0.0)
+    return rftsim.load(DROP, reduction=0.0)
 
 
 @pytest.mark.parametrize("path", ["sand/force", "/world/x", "", "reward//x"])
@@ -211,7 +211,7 @@ def test_a_model_without_sand(tmp_path):
 
 def test_a_finer_surface(tmp_path):
     """The drawn triangles need not be those that feel the sand; each takes the nearest one's traction."""
-    model = rftsim.load(DROP, max_edge=0.02, tolerance=0.0)
+    model = rftsim.load(DROP, max_edge=0.02, reduction=0.0)
     data = mujoco.MjData(model)
     data.qpos[2] = 0.05
     data.qvel[2] = -1.0

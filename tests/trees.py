@@ -14,6 +14,8 @@ JOINTS = {
     "hinge": '<joint type="hinge" axis=".2 1 .1" pos="0 .03 0"/>',
     "two": '<joint type="slide" axis="0 0 1"/><joint type="hinge" axis="0 1 0"/>',
     "none": "",
+    "planar": '<joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/><joint axis="0 1 0"/>',
+    "pitch": '<joint axis="0 1 0" pos=".03 0 -.02"/>',
 }
 
 
@@ -28,17 +30,17 @@ def spec_of(bodies=BALL, option="", extra=""):
 def sandy(mjcf=BALL, option="", sand=SAND, law="rft3d", force="explicit", **options):
     """A compiled model with sand under it, whose force is that of the moment."""
     spec = spec_of(mjcf, option)
-    add_sand(spec, sand, law, force=force, **{"tolerance": 0.0} | options)
+    add_sand(spec, sand, law, force=force, **{"reduction": 0.0} | options)
     return spec.compile()
 
 
-def tree(rng, kinds):
-    """Bodies of the given joints, each hanging on an earlier one (free ones on the world)."""
+def tree(rng, kinds, *, planar=False):
+    """Bodies of the given joints, each hanging on an earlier one (free ones on the world), turned anyhow, or in x-z."""
     parents = [-1 if kind == "free" or i == 0 else int(rng.integers(i)) for i, kind in enumerate(kinds)]
 
     def body(i):
         x, y, z = rng.uniform(-0.1, 0.1, size=3)
-        quat = " ".join(f"{q:.6f}" for q in rng.normal(size=4))
+        quat = " ".join(f"{q:.6f}" for q in rng.normal(size=4) * ((1, 0, 1, 0) if planar else 1))
         size = " ".join(f"{s:.4f}" for s in rng.uniform(0.03, 0.08, size=3))
         shape = f'<geom type="{rng.choice(["box", "ellipsoid"])}" size="{size}" pos="{x:.4f} {y:.4f} 0"/>'
         children = "".join(body(j) for j, parent in enumerate(parents) if parent == i)

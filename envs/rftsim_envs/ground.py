@@ -35,7 +35,9 @@ def lay(task: Task, robot: mujoco.MjSpec | None = None) -> mujoco.MjModel:
     config, spec = task.config, task.build() if robot is None else robot
     spec.option.timestep = config.timestep
     if config.ground == "sand":
-        add_sand(spec, config.sand, config.law, bodies=task.felt, max_edge=task.edge, **{**WHOLE, **task.options()})
+        options = {"bodies": task.felt, "max_edge": task.edge, **WHOLE, **task.options()}
+        solution = {"tolerance": config.tolerance, "iterations": config.iterations}
+        add_sand(spec, config.sand, config.law, **{**solution, **options})
     else:
         _add_floor(spec)
     return spec.compile()

@@ -9,6 +9,8 @@ import mujoco
 import numpy as np
 
 from rftsim.errors import RftsimError
+from rftsim.law import layout
+from rftsim.model.solution import check_solution
 from rftsim.sand.presets import make_sand
 from rftsim_envs.physics import Array, Flags
 from rftsim_envs.recipe import Drive, Training
@@ -27,6 +29,8 @@ class Config:
         ground: `sand`, or `rigid`: a floor with friction in its place.
         sand: The medium: a preset, key=value,... or a TOML file.
         law: The force law.
+        tolerance: Error of a body's velocity, relative, to which the sand's implicit force is solved for, 1e-6 to 0.1.
+        iterations: Most iterations of one such solution, 1 to 60.
         strength: Range of the factor of the sand's strength (xi_n and zeta), drawn for each episode, log-uniform.
         friction: Range of the factor of the friction: mu_surf of the sand, or that of the rigid floor.
         slope_deg: Largest slope of the ground [deg], drawn uniformly for each episode, in any direction that the robot
@@ -41,6 +45,8 @@ class Config:
     ground: Literal["sand", "rigid"] = "sand"
     sand: str = "poppy-seeds"
     law: str = "rft3d"
+    tolerance: float = layout.TOLERANCE
+    iterations: int = layout.ITERATIONS
     strength: tuple[float, float] = (1.0, 1.0)
     friction: tuple[float, float] = (1.0, 1.0)
     slope_deg: float = 0.0
@@ -60,6 +66,7 @@ class Config:
             raise ConfigError(f"slope_deg must be at least 0 and below 45, not {self.slope_deg:g}")
         if not math.isclose(self.substeps * self.timestep, self.period, rel_tol=1e-9) or self.substeps < 1:
             raise ConfigError(f"period = {self.period:g} s must be a multiple of timestep = {self.timestep:g} s")
+        check_solution(self.tolerance, self.iterations, ConfigError)
         make_sand(self.sand)
 
     @property

@@ -163,7 +163,7 @@ def _staged(subject: Subject, law: str, mesh: Mesh, force: Force) -> Staged:
         return subject.stage(law, force=force)
     if mesh == "fine":
         return subject.stage(law, force=force, max_edge=subject.fine)
-    return subject.stage(law, force=force, max_edge=subject.fine, tolerance=float(mesh.removesuffix(" %")) / 100)
+    return subject.stage(law, force=force, max_edge=subject.fine, reduction=float(mesh.removesuffix(" %")) / 100)
 
 
 def _path(subject: Subject, staged: Staged, h: float) -> tuple[Array, float]:

@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -13,21 +13,23 @@ from rich.table import Table
 from rftsim.cli.output import print_json, print_line
 from rftsim.cli.scene import Scene
 from rftsim.errors import RftsimError
-from rftsim.model.add_sand import Bed
+from rftsim.model.add_sand import REDUCTION, Bed
 from rftsim.model.poses import posed
+from rftsim.model.readout import instances
 from rftsim.model.standing import Tree, standing
-from rftsim.run.advice import advise
+from rftsim.run.advice import Advice, advise
+from rftsim.run.scenes import Staged
 
 
 @dataclasses.dataclass(frozen=True)
 class Inspect(Scene):
     """Show how a scene would be modelled: bodies, triangles, law, sand, and why; and how much of it the scene needs.
 
-    Example: rftsim inspect robot.xml --sand poppy-seeds --tolerance 0.01
+    Example: rftsim inspect robot.xml --sand poppy-seeds --reduction 0.01
     """
 
-    tolerance: float = 0.01
-    """Largest error of a body's wrench, from which follows how many elements it needs."""
+    reduction: float | None = None
+    """Largest error of a body's wrench, from which follows how many elements it needs; by default 0.01."""
     speed: float | None = None
     """Speed that decides on the law [m/s]; by default that of the fastest body at the start."""
     json: bool = False
@@ -37,43 +39,75 @@ class Inspect(Scene):
         """Stage the scene, whole and reduced, and print how it is modelled."""
         if self.speed is not None and not self.speed >= 0.0:
             raise RftsimError(f"the speed must be zero or more, not {self.speed:g} m/s")
-        whole, lean = self.staged(tolerance=0.0), self.staged(tolerance=self.tolerance)
-        bed = whole.bed
-        advice = advise(lean.model, lean.bed, self.speed)
-        stands = standing(whole.model, posed(whole.model, self.keyframe))
-        bodies = {name: _body(bed, lean.bed, name) for name in bed.reasons}
+        reduction = REDUCTION if self.reduction is None else self.reduction
+        found = _inspected(self.staged(reduction=0.0), self.staged(reduction=reduction), self.speed, self.keyframe)
         if self.json:
             print_json(
-                {
-                    "scene": self.scene,
-                    "law": bed.law.name,
-                    "law_says": bed.law.says,
-                    "sand": dataclasses.asdict(bed.sand),
-                    "surface": dataclasses.asdict(bed.terrain),
-                    "timestep_s": float(whole.model.opt.timestep),
-                    "bodies": bodies,
-                    "triangles": sum(surface.ntri for surface in bed.surfaces.values()),
-                    "tolerance": self.tolerance,
-                    "elements": sum(surface.ntri for surface in lean.bed.surfaces.values()),
-                    "stands": [_stand(whole.model, tree) for tree in stands.trees],
-                    "advice": [one._asdict() for one in advice],
-                    "choices": bed.choices,
-                    "warnings": warnings(),
-                }
+                {"scene": self.scene, "reduction": reduction} | _report(found) | {"warnings": warnings()},
             )
             return
-        console = Console()
+        console, bed = Console(), found.whole.bed
         console.print(f"[bold]{self.scene}[/bold]  law {bed.law.name}: {bed.law.says}", highlight=False)
         given = {k: v for k, v in dataclasses.asdict(bed.sand).items() if v not in (None, "")}
         console.print("sand  " + ", ".join(f"{k} {v:g}" if k != "source" else v for k, v in given.items()))
-        console.print(_table(bodies, self.tolerance))
-        for name, row in bodies.items():
+        print_line(console, _solution_line(found.whole.model))
+        console.print(_table(found.bodies, reduction))
+        for name, row in found.bodies.items():
             print_line(console, f"{name}: {row['why']}")
-        for tree in stands.trees:
-            print_line(console, escape(_stand_line(whole.model, tree)))
-        for one in advice:
+        for tree in found.trees:
+            print_line(console, escape(_stand_line(found.whole.model, tree)))
+        for one in found.advice:
             change = "keep" if one.law == bed.law.name else f"--law {one.law}, not"
             print_line(console, f"law: {change} {bed.law.name}: {one.reason}")
+
+
+class _Inspected(NamedTuple):
+    """A scene as it would be modelled."""
+
+    whole: Staged
+    """With every triangle."""
+    lean: Staged
+    """With the fewest elements."""
+    bodies: dict[str, dict[str, Any]]
+    """The measures of each body, by its name, as JSON has them."""
+    trees: tuple[Tree, ...]
+    """The trees of bodies as they stand in the sand."""
+    advice: list[Advice]
+    """The laws that would serve."""
+
+
+def _inspected(whole: Staged, lean: Staged, speed: float | None, keyframe: str | None) -> _Inspected:
+    advice = advise(lean.model, lean.bed, speed)
+    trees = standing(whole.model, posed(whole.model, keyframe)).trees
+    bodies = {name: _body(whole.bed, lean.bed, name) for name in whole.bed.reasons}
+    return _Inspected(whole, lean, bodies, trees, advice)
+
+
+def _report(found: _Inspected) -> dict[str, Any]:
+    """The report as JSON has it, but for what the command line knows."""
+    model, bed = found.whole.model, found.whole.bed
+    solution = instances(model)[0].bed
+    return {
+        "law": bed.law.name,
+        "law_says": bed.law.says,
+        "sand": dataclasses.asdict(bed.sand),
+        "surface": dataclasses.asdict(bed.terrain),
+        "timestep_s": float(model.opt.timestep),
+        "tolerance": float(solution.tolerance),
+        "iterations": int(solution.iterations),
+        "bodies": found.bodies,
+        "triangles": sum(surface.ntri for surface in bed.surfaces.values()),
+        "elements": sum(surface.ntri for surface in found.lean.bed.surfaces.values()),
+        "stands": [_stand(model, tree) for tree in found.trees],
+        "advice": [one._asdict() for one in found.advice],
+        "choices": bed.choices,
+    }
+
+
+def _solution_line(model: mujoco.MjModel) -> str:
+    """A line that says how exactly the implicit force is solved for."""
+    bed = instances(model)[0].bed
+    return f"implicit force: solved to {bed.tolerance:g} of a body's velocity, in {bed.iterations:g} iterations at most"
 
 
 def _body(whole: Bed, lean: Bed, name: str) -> dict[str, Any]:
@@ -110,8 +144,8 @@ def _stand_line(model: mujoco.MjModel, tree: Tree) -> str:
     return f"stands: {name}, {tree.weight:.4g} N, lowered by {1000 * tree.lowered:.1f} mm: {feet}"
 
 
-def _table(bodies: dict[str, dict[str, Any]], tolerance: float) -> Table:
-    table = Table("body", caption=f"needed: what --tolerance {tolerance:g} models; errors of its wrench in %")
+def _table(bodies: dict[str, dict[str, Any]], reduction: float) -> Table:
+    table = Table("body", caption=f"needed: what --reduction {reduction:g} models; errors of its wrench in %")
     for heading in ("triangles", "needed", "error", "held back", "area [m²]"):
         table.add_column(escape(heading), justify="right")
     table.add_column("wheel")

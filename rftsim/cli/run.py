@@ -33,8 +33,6 @@ class Run(Scene):
 
     force: Literal["implicit", "explicit"] = "implicit"
     """The sand's force: at the end of each step, or at the velocity of the moment, which needs short steps."""
-    tolerance: float | None = None
-    """Model only what the scene needs: the fewest elements whose wrench errs by at most this share, as 0.01."""
     duration: float | None = None
     """Simulated time [s]; by default the scene's."""
     timestep: float | None = None
@@ -84,7 +82,6 @@ class Run(Scene):
             timestep=self.timestep,
             duration=self.duration,
             force=self.force,
-            tolerance=self.tolerance,
         )
 
     def _report(self, staged: Staged, finished: Finished, warnings: list[str]) -> dict[str, Any]:

@@ -40,6 +40,13 @@ class Scene:
     """Name or number of the keyframe in which a model file starts; by default the first."""
     keep_floor: bool = False
     """Leave the floor at the sand's level as it is; by default it no longer collides, and is hidden."""
+    reduction: float | None = None
+    """Model only what the scene needs: the fewest elements whose wrench errs by at most this share; 0 for every
+    triangle; by default 0.01 for model files, and 0 for shipped scenes."""
+    tolerance: float | None = None
+    """Error of a body's velocity, relative, that the implicit force is solved to, 1e-6 to 0.1; by default 0.003."""
+    iterations: int | None = None
+    """Most iterations of one solution of the implicit force, 1 to 60; by default 20."""
 
     def staged(self, *, settle: bool = True, **options: Any) -> Staged:
         """Make the scene with its sand, compiled.
@@ -50,6 +57,7 @@ class Scene:
         """
         if self.keyframe is not None and self.scene in SCENES:
             raise RftsimError(f"{self.scene} has a start of its own; --keyframe is for model files")
+        options.setdefault("reduction", self.reduction)
         if self.bodies is not None:
             options["bodies"] = [name.strip() for name in self.bodies.split(",")]
         if self.surface is not None:
@@ -63,6 +71,8 @@ class Scene:
             geoms=self.geoms,
             meshes=self.meshes,
             keep_floor=self.keep_floor,
+            tolerance=self.tolerance,
+            iterations=self.iterations,
             **options,
         )
 

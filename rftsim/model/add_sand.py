@@ -28,10 +28,11 @@ from rftsim.model.floors import (
     say_ground,
 )
 from rftsim.model.geometry import Geoms, Meshes
+from rftsim.model.planar import check_planar
 from rftsim.model.readings import reading_doubts
 from rftsim.model.shaping import Fineness
+from rftsim.model.solution import check_solution
 from rftsim.model.standing import stand
-from rftsim.model.start import start
 from rftsim.model.wheels import rolling
 from rftsim.model.write import (
     Carrier,
@@ -48,9 +49,9 @@ from rftsim.sand.medium import Sand
 from rftsim.sand.presets import make_sand
 from rftsim.surface.triangles import Array, Surface, Wheel
 
-TOLERANCE: Final = 0.01
+REDUCTION: Final = 0.01
 """Largest error of a body's wrench for which its surface is reduced, unless the caller says otherwise [-]."""
-WHOLE: Final[Mapping[str, Any]] = {"terrain": 0.0, "meshes": "exact", "tolerance": 0.0}
+WHOLE: Final[Mapping[str, Any]] = {"terrain": 0.0, "meshes": "exact", "reduction": 0.0}
 """Options of models that were made for sand: level at z = 0, every triangle felt, and meshes as they are."""
 Force = Literal["implicit", "explicit"]
 """When the sand's force is taken: at the end of the step, or at the velocity of the moment."""
@@ -76,7 +77,7 @@ class Bed(NamedTuple):
     notes: tuple[str, ...]
     """Sentences that say what was found doubtful or repaired, one for each kind."""
     economies: dict[str, Economy]
-    """Numbers of the surfaces before and after they were reduced, by body name; empty at zero tolerance."""
+    """Numbers of the surfaces before and after they were reduced, by body name; empty at zero reduction."""
 
 
 def add_sand(
@@ -91,11 +92,13 @@ def add_sand(
     geoms: Geoms = "collision",
     meshes: Meshes = "hull",
     max_edge: float | None = None,
-    tolerance: float = TOLERANCE,
+    reduction: float = REDUCTION,
     wheels: "Mapping[str, Wheel] | Iterable[str] | str" = (),
     sensors: bool = True,
     draw: bool = True,
     force: Force = "implicit",
+    tolerance: float = layout.TOLERANCE,
+    iterations: int = layout.ITERATIONS,
     name: str = "sand",
 ) -> Bed:
     """Put sand under a model that is not compiled yet, in the place of the floor that it stands on.
@@ -113,12 +116,13 @@ def add_sand(
             box, mesh or height field that the model stands on at its first keyframe, or z = 0 where there is none.
         keep_floor: Leave the floors at the sand's level as they are. By default they lose their collision, and their
             contact pairs, and are hidden.
-        plane: Normal of the vertical plane of motion, for the 2D laws.
+        plane: Normal of the vertical plane of motion, for the 2D laws. Joints have to keep the bodies in it, as nothing
+            would stop them across it.
         geoms: Which geoms bound a body: those that can collide, or `all`: where it has none of these, those it has.
         meshes: `hull`: geoms of meshes are felt as the convex hulls by which MuJoCo collides with them; `exact`: as
             they are. What is open is felt as its hull, and what collides with nothing as it is.
         max_edge: Longest edge of a triangle [m]; by default a sixth of each geom's size.
-        tolerance: Model only what the scene needs: the fewest elements whose wrench is that of all triangles within
+        reduction: Model only what the scene needs: the fewest elements whose wrench is that of all triangles within
             this share (see `rftsim.reduction`), in the poses and motions that the joints allow, and none of bodies that
             cannot reach the sand unless they are named in `bodies`. It holds for this sand, law and tree. Zero models
             every triangle of every body, also for a model that is attached to another, or whose sand is tilted later.
@@ -128,45 +132,51 @@ def add_sand(
         draw: Draw the free surface as a translucent plane.
         force: `implicit`: the sand's force at the end of each step, which holds at rest and at long steps; `explicit`:
             at the velocity of the moment.
+        tolerance: Error of a body's velocity, relative, to which the implicit force is solved for in each step, 1e-6 to
+            0.1. A smaller one costs iterations, and wins little where the step itself errs more; a larger one spares
+            some, and lets bodies at rest creep faster.
+        iterations: Most iterations of one such solution, 1 to 60, of one evaluation of every body's force or more each.
+            What is not solved by then is taken as it is, and counted by `rftsim.work` as `unsolved`. A smaller number
+            bounds the time of a step, a larger one lets hard steps end within the tolerance.
         name: Name of the bed, where a model has several.
 
     Returns:
         What was modelled.
 
     Raises:
-        RftsimError: The scene cannot have sand: unknown bodies, surfaces that bound nothing, flags that would skip it.
+        RftsimError: The scene cannot have sand: unknown bodies, surfaces that bound nothing, flags that would skip it,
+            bodies that can leave the plane of a 2D law.
     """
-    _check_choices(force, geoms, meshes, max_edge, tolerance)
+    _check_choices(force, geoms, meshes, max_edge, reduction)
+    _check_solution(tolerance, iterations)
     bed_sand, bed_law = make_sand(sand), get_law(law)
     check_bed(spec, name)
     draft = make_draft(spec)  # what is checked; the spec itself stays as it is until all is well
     _check_model(draft.model)
     site = _site(spec, draft, terrain)
-    numbers = layout.pack_bed(bed_sand, bed_law, site.terrain, plane)
+    numbers = layout.pack_bed(bed_sand, bed_law, site.terrain, plane, tolerance=tolerance, iterations=iterations)
     choice = Choice(
         bodies=None if bodies is None else frozenset(_names(bodies)),
         fineness=Fineness(geoms, meshes, max_edge),
         plane=layout.record(numbers, layout.BED).plane if bed_law.planar else None,
-        terrain=site.terrain if tolerance and bodies is None else None,
+        terrain=site.terrain if reduction and bodies is None else None,
     )
-    felt = felt_bodies(draft.model, choice)
+    felt = felt_bodies(draft.model, draft.data, choice)
+    check_planar(draft.model, draft.data, felt.surfaces, bed_law, choice.plane)
     wheeled = rolling(draft.model, felt.surfaces, wheels if isinstance(wheels, Mapping) else _names(wheels))
-    if bed_law.dynamic:
-        felt.surfaces.update(wheeled)
-    economies = economise(draft.model, felt, numbers, tolerance) if tolerance else {}
-    floors = find_floors(draft.model, site.terrain, max(surface.size for surface in felt.surfaces.values()))
-    if sensors:
-        check_sensors(spec, felt.surfaces)
+    felt.surfaces.update(wheeled if bed_law.dynamic else {})
+    economies = economise(draft.model, felt, numbers, reduction) if reduction else {}
+    reach = max(surface.size for surface in felt.surfaces.values())
+    floors = find_floors(draft.model, draft.data, site.terrain, reach)
+    check_sensors(spec, felt.surfaces if sensors else ())
     if draw:
         check_drawing(spec, name)
-    notes = [*felt.doubts, *doubts.gravity_doubts(draft.model, bed_sand), *_doubts(draft.model, numbers, felt, floors)]
-    notes += floor_doubts(floors) if keep_floor else []
+    notes = [*_doubts(draft, bed_sand, numbers, felt, floors), *(floor_doubts(floors) if keep_floor else ())]
 
     name_bodies(spec, draft)
     carrier = Carrier(name, plugin.IMPLICIT if force == "implicit" else plugin.EXPLICIT)
     write_bed(spec, carrier, numbers, felt.surfaces)
-    if sensors:
-        write_sensors(spec, carrier, felt.surfaces)
+    write_sensors(spec, carrier, felt.surfaces if sensors else ())
     if draw:
         write_drawing(spec, name, site.terrain)
     choices = [*felt.choices, *_integrate(spec, force)]
@@ -194,7 +204,7 @@ def _site(spec: mujoco.MjSpec, draft: Draft, terrain: "FreeSurface | float | Non
         if block.SAND_MARKER in numeric.name:
             other = layout.record(np.array(numeric.data), layout.BED)
             return _Site(FreeSurface(float(other.offset / other.up[2]), tuple(other.up.tolist())), None)
-    ground = find_ground(draft.model)
+    ground = find_ground(draft.model, draft.data)
     return _Site(FreeSurface() if ground is None else ground.terrain, ground)
 
 
@@ -206,11 +216,14 @@ def _integrate(spec: mujoco.MjSpec, force: str) -> list[str]:
     return ["the integrator is implicitfast now: RK4 would take the sand's force at the velocity of the moment"]
 
 
-def _doubts(model: mujoco.MjModel, bed: Array, felt: Felt, floors: Floors) -> list[str]:
-    """The doubts about sensors of felt bodies, and those that show when the model stands in its sand."""
+def _doubts(draft: Draft, sand: Sand, bed: Array, felt: Felt, floors: Floors) -> list[str]:
+    """The doubts about surfaces, gravity and sensors, and those that show when the model stands in its sand."""
+    model = draft.model
     packed = {model.body(name).id: layout.pack_surface(surface) for name, surface in felt.surfaces.items()}
-    found = stand(model, start(model), bed, packed)
+    found = stand(model, draft.data, bed, packed)
     return [
+        *felt.doubts,
+        *doubts.gravity_doubts(model, sand),
         *reading_doubts(model, packed),
         *doubts.sinkage_doubts(model, found, felt.surfaces),
         *doubts.footprint_doubts(model, found, floors.terrain),
@@ -266,14 +279,22 @@ def _names(names: Iterable[str]) -> Iterable[str]:
     return [names] if isinstance(names, str) else names
 
 
-def _check_choices(force: str, geoms: str, meshes: str, max_edge: float | None, tolerance: float) -> None:
+def _check_choices(force: str, geoms: str, meshes: str, max_edge: float | None, reduction: float) -> None:
     for label, value, kind in (("force", force, Force), ("geoms", geoms, Geoms), ("meshes", meshes, Meshes)):
         if value not in get_args(kind):
             raise SceneError(f"{label} must be {' or '.join(map(repr, get_args(kind)))}, not {value!r}")
     if max_edge is not None and not max_edge > 0.0:
         raise SceneError(f"max_edge must be positive, not {max_edge:g}")
-    if not 0.0 <= tolerance < 1.0:
-        raise SceneError(f"tolerance must be zero, or below 1 as {TOLERANCE} is, not {tolerance:g}")
+    if not 0.0 <= reduction < 1.0:
+        raise SceneError(f"reduction must be zero, or below 1 as {REDUCTION} is, not {reduction:g}")
+
+
+def _check_solution(tolerance: float, iterations: int) -> None:
+    if tolerance == 0.0:
+        raise SceneError(
+            "tolerance is that of the implicit force, 1e-06 to 0.1, not 0; reduction=0 keeps every triangle"
+        )
+    check_solution(tolerance, iterations)
 
 
 def _check_model(model: mujoco.MjModel) -> None:

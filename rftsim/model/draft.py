@@ -4,6 +4,8 @@ from typing import Final, NamedTuple
 
 import mujoco
 
+from rftsim.model.start import start
+
 TEMPORARY: Final = "rftsim-geom:"
 """Beginning of a draft's name of a geom that has none in the spec; its place in the spec follows."""
 
@@ -12,6 +14,8 @@ class Draft(NamedTuple):
     """A compiled copy of a spec whose bodies and geoms all have names."""
 
     model: mujoco.MjModel
+    data: mujoco.MjData
+    """Its data in the pose in which it starts, with kinematics and centres of mass."""
     bodies: list[str]
     """Names of the spec's bodies, in its order."""
 
@@ -20,7 +24,8 @@ def make_draft(spec: mujoco.MjSpec) -> Draft:
     """The draft of a spec, which stays as it is."""
     copy = spec.copy()
     bodies = _name_elements(copy)
-    return Draft(copy.compile(), bodies)
+    model = copy.compile()
+    return Draft(model, start(model), bodies)
 
 
 def _name_elements(copy: mujoco.MjSpec) -> list[str]:

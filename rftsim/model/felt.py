@@ -10,7 +10,7 @@ import numpy as np
 from rftsim.errors import SceneError
 from rftsim.law import layout
 from rftsim.model.geometry import bounding_geoms, colliding
-from rftsim.model.reach import clearance, stays_in_plane
+from rftsim.model.reach import clearance
 from rftsim.model.shaping import Fineness, Shaping, shape
 from rftsim.sand.free_surface import FreeSurface
 from rftsim.surface.triangles import Array, Surface
@@ -47,8 +47,13 @@ class Felt(NamedTuple):
     """Sentences about what of them is doubtful, one for each kind."""
 
 
-def felt_bodies(model: mujoco.MjModel, choice: Choice) -> Felt:
+def felt_bodies(model: mujoco.MjModel, data: mujoco.MjData, choice: Choice) -> Felt:
     """The chosen bodies with their surfaces, in blocks of triangles that lie close together.
+
+    Args:
+        model: Compiled.
+        data: Its data at the start, with kinematics.
+        choice: Which bodies, and what of their surfaces.
 
     Raises:
         SceneError: A chosen body does not exist or cannot feel the sand, or no body would.
@@ -62,10 +67,10 @@ def felt_bodies(model: mujoco.MjModel, choice: Choice) -> Felt:
         told = ["no geom of a body that moves collides, so that all of them are felt"]
     unfit = {body: _unfit(model, body, names[body], choice) for body in range(1, model.nbody)}
     shaping = shape(model, [body for body, why in unfit.items() if not why], choice.fineness)
-    surfaces, reasons = _within_reach(model, unfit, shaping, choice)
+    surfaces, reasons = _within_reach(model, data, unfit, shaping, choice)
     felt = Felt(surfaces, reasons, [*shaping.choices, *told], shaping.doubts)
     if not felt.surfaces and choice.terrain is not None and shaping.surfaces:
-        surfaces, reasons = _within_reach(model, unfit, shaping, choice._replace(terrain=None))
+        surfaces, reasons = _within_reach(model, data, unfit, shaping, choice._replace(terrain=None))
         doubt = "no body can come down to the sand, as its joints go: put the sand higher (terrain=)"
         felt = Felt(surfaces, reasons, felt.choices, [*felt.doubts, doubt])
     if not felt.surfaces:
@@ -77,13 +82,15 @@ def felt_bodies(model: mujoco.MjModel, choice: Choice) -> Felt:
 
 
 def _within_reach(
-    model: mujoco.MjModel, unfit: dict[int, str], shaping: Shaping, choice: Choice
+    model: mujoco.MjModel, data: mujoco.MjData, unfit: dict[int, str], shaping: Shaping, choice: Choice
 ) -> tuple[dict[str, Surface], dict[str, str]]:
     """Surfaces of the bodies that feel the sand, in blocks, and the reasons for all, by body name."""
     surfaces, reasons = {}, {}
     for body, why in unfit.items():
         name = model.body(body).name
         surface, reasons[name] = (None, why) if why else _felt_surface(model, body, shaping, choice)
+        if surface is not None and choice.plane is not None:
+            surface, reasons[name] = _carrying(surface, data.xmat[body].reshape(3, 3).T @ choice.plane)
         if surface is not None:
             surfaces[name] = surface.clustered(layout.BLOCK)
         elif choice.bodies is not None and name in choice.bodies:
@@ -133,21 +140,19 @@ def _felt_surface(model: mujoco.MjModel, body: int, shaping: Shaping, choice: Ch
         above = clearance(model, body, surface, choice.terrain)
         if above > CLEAR * surface.size:
             return None, f"stays {above:.3g} m or more above the sand, by its tree and its joints' ranges"
-    return _carrying(model, body, surface, choice.plane)
+    return surface, f"moves, {surface.ntri} triangles"
 
 
-def _carrying(model: mujoco.MjModel, body: int, surface: Surface, plane: Array | None) -> tuple[Surface, str]:
-    """The part of a surface that can carry a force, and why.
+def _carrying(surface: Surface, plane: Array) -> tuple[Surface, str]:
+    """The part of a surface that a planar law can press on, and why: faces parallel to the plane carry nothing.
 
-    Under a planar law, faces parallel to the plane of motion carry nothing; where the body cannot turn out of that
-    plane they never will.
+    Args:
+        surface: The body's surface.
+        plane: Normal of the plane of motion, body frame, in which the body stays.
     """
-    everything = f"moves, {surface.ntri} triangles"
-    if plane is None or not stays_in_plane(model, body, plane):
-        return surface, everything
     carries = np.abs(surface.normals @ plane) < 1.0 - 1e-6
     if carries.all() or not carries.any():
-        return surface, everything
+        return surface, f"moves, {surface.ntri} triangles"
     return (
         dataclasses.replace(surface, triangles=surface.triangles[carries]),
         f"moves in the plane; {np.count_nonzero(~carries)} of {surface.ntri} triangles are parallel to it and left out",

@@ -8,7 +8,7 @@ import numpy as np
 
 from rftsim.model.draft import geom_of, shown
 from rftsim.model.geometry import colliding
-from rftsim.model.start import standing_trees, start
+from rftsim.model.start import standing_trees
 from rftsim.model.tops import LEVEL, Top, relief, top_at
 from rftsim.sand.free_surface import FreeSurface
 from rftsim.surface.triangles import Array
@@ -44,13 +44,16 @@ class Floors(NamedTuple):
     """Those that are only drawn in the sand's surface."""
 
 
-def find_ground(model: mujoco.MjModel) -> Ground | None:
+def find_ground(model: mujoco.MjModel, data: mujoco.MjData) -> Ground | None:
     """Find the geom that a model's heaviest tree stands on at the start: the highest top below its centre of mass.
 
     Trees that can fall count first, and then those whose base is fixed. What is narrower than the tree carries it only
     where nothing else does, and what lies above only where nothing lies below.
+
+    Args:
+        model: Compiled.
+        data: Its data at the start, with kinematics and centres of mass.
     """
-    data = start(model)
     candidates = _static(model, can_touch(model))
     moving = [body for body in range(1, model.nbody) if model.body_weldid[body] == body]
     for root in [*standing_trees(model), *moving]:
@@ -103,7 +106,7 @@ def _static(model: mujoco.MjModel, among: Any) -> list[int]:
     return np.flatnonzero(held[model.geom_bodyid] & among).tolist()
 
 
-def find_floors(model: mujoco.MjModel, terrain: FreeSurface, reach: float) -> Floors:
+def find_floors(model: mujoco.MjModel, data: mujoco.MjData, terrain: FreeSurface, reach: float) -> Floors:
     """The floors of a model near the terrain.
 
     Planes and height fields are floors where they are nearer than the reach above or below it. Others have edges: those
@@ -111,10 +114,10 @@ def find_floors(model: mujoco.MjModel, terrain: FreeSurface, reach: float) -> Fl
 
     Args:
         model: Compiled.
+        data: Its data at the start, with kinematics and centres of mass.
         terrain: Surface of the sand.
         reach: Size of the largest body that feels the sand [m].
     """
-    data = start(model)
     trees = standing_trees(model)
     place = data.subtree_com[trees[0]] if trees else np.zeros(3)
     endless = (_GEOM.mjGEOM_PLANE, _GEOM.mjGEOM_HFIELD)

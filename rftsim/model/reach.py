@@ -79,22 +79,6 @@ def _quaternions(largest: float | None, rng: np.random.Generator) -> Array:
     return np.hstack([np.cos(half), np.sin(half) * axis])
 
 
-def stays_in_plane(model: mujoco.MjModel, body: int, plane: Array) -> bool:
-    """Whether every joint above a body is a slide or a hinge about the plane's normal, from an upright rest pose."""
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    if not np.allclose(data.xmat[body].reshape(3, 3) @ plane, plane, atol=1e-9):
-        return False
-    while body != 0:
-        for joint in range(model.body_jntadr[body], model.body_jntadr[body] + model.body_jntnum[body]):
-            kind = _JOINT(model.jnt_type[joint])
-            about = abs(data.xaxis[joint] @ plane) > 1.0 - 1e-9
-            if kind != _JOINT.mjJNT_SLIDE and not (kind == _JOINT.mjJNT_HINGE and about):
-                return False
-        body = model.body_parentid[body]
-    return True
-
-
 def clearance(model: mujoco.MjModel, body: int, surface: Surface, terrain: FreeSurface) -> float:
     """A height over the sand that a body cannot come below, by its tree and its joints' ranges [m]; or -inf.
 

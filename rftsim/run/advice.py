@@ -7,13 +7,14 @@ import mujoco
 import numpy as np
 
 from rftsim.model.add_sand import Bed
-from rftsim.model.reach import stays_in_plane
-from rftsim.model.readout import body_velocities
+from rftsim.model.planar import joints_that_leave
+from rftsim.model.readout import body_velocities, instances
+from rftsim.model.start import start
 from rftsim.run.validity import FROUDE_LIMIT
 from rftsim.surface.triangles import Array, Surface
 
-PLANES: Final = {"x": np.array([0.0, 1.0, 0.0]), "y": np.array([1.0, 0.0, 0.0])}
-"""Normals of the vertical planes that are tried, by their horizontal axis."""
+PLANES: Final = {"x-z plane": np.array([0.0, 1.0, 0.0]), "y-z plane": np.array([1.0, 0.0, 0.0])}
+"""Normals of the vertical planes that are tried, by their names."""
 
 
 class Advice(NamedTuple):
@@ -33,15 +34,28 @@ def advise(model: mujoco.MjModel, bed: Bed, speed: float | None = None) -> list[
         bed: Its sand.
         speed: Speed of the bodies that feel the sand [m/s]; by default each one's at the start: the first keyframe's.
     """
-    bodies = [model.body(name).id for name in bed.surfaces]
-    flat = [axis for axis, normal in PLANES.items() if all(stays_in_plane(model, body, normal) for body in bodies)]
-    return [_dimensions(bed, flat), _dynamics(model, bed, speed, PLANES[flat[0]] if flat else np.zeros(3))]
+    flat = _planes(model, bed)
+    return [_dimensions(bed, list(flat)), _dynamics(model, bed, speed, next(iter(flat.values()), np.zeros(3)))]
+
+
+def _planes(model: mujoco.MjModel, bed: Bed) -> dict[str, Array]:
+    """Normals of the planes that the bodies cannot leave, by name; of a planar law that which it acts in."""
+    if bed.law.planar:
+        (plane,) = (one.bed.plane for one in instances(model) if one.name == bed.name)
+        name = next((name for name, normal in PLANES.items() if abs(normal @ plane) == 1.0), "plane of motion")
+        return {name: np.array(plane)}
+    data, bodies = start(model), [model.body(name).id for name in bed.surfaces]
+    return {
+        name: normal
+        for name, normal in PLANES.items()
+        if not any(joints_that_leave(model, data, body, normal) for body in bodies)
+    }
 
 
 def _dimensions(bed: Bed, flat: list[str]) -> Advice:
     law, bodies = bed.law.name, f"all {len(bed.surfaces)} bodies" if len(bed.surfaces) > 1 else "the one body"
     if flat:
-        why = f"the joints keep {bodies} that can feel the sand in the {flat[0]}-z plane: a 2D law serves"
+        why = f"the joints keep {bodies} that can feel the sand in the {flat[0]}: a 2D law serves"
         if bed.law.planar:
             return Advice(law, why)
         return Advice(
@@ -49,8 +63,6 @@ def _dimensions(bed: Bed, flat: list[str]) -> Advice:
             f"{why}, with less arithmetic. It is a fit of its own, about 30 % (rms) from the 3D ones",
         )
     why = f"the joints do not keep {bodies} that can feel the sand in one vertical plane, x-z or y-z"
-    if bed.law.planar:
-        return Advice(law.replace("2d", "3d"), f"{why}, and a 2D law does not feel what moves across its plane")
     return Advice(law, f"{why}: a 3D law is needed")
 
 

@@ -180,7 +180,7 @@ def _unsolved(model: mujoco.MjModel, data: mujoco.MjData) -> list[str]:
         return []
     return [
         f"{spent.unsolved} equations of the implicit force in {spent.steps} steps were not solved to their "
-        f"tolerance: compare with a shorter timestep than {model.opt.timestep:g} s"
+        f"tolerance: compare with a shorter timestep than {model.opt.timestep:g} s, or more iterations"
     ]
 
 

@@ -110,7 +110,8 @@ class Live:
 
     def texts(self) -> tuple[str, str]:
         """Two columns of text: the time, the sand, and the keys."""
-        weight, lift = moving_weight(self.model), float(total_force(self.model, self.data)[2])
+        weight, up = moving_weight(self.model), instances(self.model)[0].bed.up
+        lift = float(total_force(self.model, self.data) @ up)
         carried = f"{100.0 * lift / weight:.0f} % of {weight:.4g} N" if weight > 0.0 else f"{lift:.4g} N"
         state = [
             ("time", f"{self.data.time:.2f} s{', paused' if self.paused else ''}"),

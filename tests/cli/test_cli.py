@@ -1,5 +1,6 @@
 """The command line as a person uses it: results, errors, and what is left on the disk."""
 
+import itertools
 import json
 
 import mujoco
@@ -7,7 +8,10 @@ import numpy as np
 import pytest
 import trimesh
 
+from rftsim import instances
 from rftsim.cli import main
+from rftsim.errors import RftsimError
+from rftsim.run import scenes
 
 SAND = "rho_c=3000,mu_int=0.4,mu_surf=0.4,xi_n=0.92e6"
 
@@ -182,28 +186,63 @@ def test_own_model_with_a_floor(capsys, tmp_path):
     assert json.loads(out)["slip"] is None
 
 
-def test_a_tolerance(capsys, tmp_path):
-    """`inspect` says what `run --tolerance` models, with the errors, and which law serves."""
+def test_a_reduction(capsys, tmp_path):
+    """`inspect` says what `run --reduction` models, with the errors, and which law serves."""
     path = tmp_path / "own.xml"
     path.write_text(FLOOR.replace('size="0.05" density', 'type="ellipsoid" size=".05 .04 .03" density'))
-    told = json.loads(call(capsys, "inspect", path, "--json", "--tolerance", 0.1)[1])
+    told = json.loads(call(capsys, "inspect", path, "--json", "--reduction", 0.1)[1])
     ball = told["bodies"]["ball"]
     assert 0 < ball["needed"] == told["elements"] < ball["triangles"] == told["triangles"]
     assert 0.0 < ball["error"] <= 0.1
     assert 0.0 < ball["error_held_back"] <= 0.2
     assert f"{ball['needed']} elements keep its wrench within" in ball["why"]
     assert [one["law"] for one in told["advice"]] == ["rft3d", "rft3d"]
-    told = json.loads(call(capsys, "inspect", path, "--json", "--tolerance", 0.1, "--speed", 2)[1])
+    told = json.loads(call(capsys, "inspect", path, "--json", "--reduction", 0.1, "--speed", 2)[1])
     assert told["advice"][1]["law"] == "drft3d"
     assert "--law drft3d, not rft3d" in call(capsys, "inspect", path, "--speed", 2)[1]
     runs = [
         json.loads(call(capsys, "run", path, "--duration", 0.3, "--json", *more)[1])
-        for more in ((), ("--tolerance", 0.1))
+        for more in ((), ("--reduction", 0.1))
     ]
     assert runs[1]["sinkage_m"] == pytest.approx(runs[0]["sinkage_m"], rel=0.1)
-    code, out, err = call(capsys, "run", path, "--tolerance", 1)
+    code, out, err = call(capsys, "run", path, "--reduction", 1)
     assert (code, out) == (2, "")
-    assert "tolerance must be zero, or below 1" in err
+    assert "reduction must be zero, or below 1" in err
+
+
+def test_the_solution_of_the_implicit_force(capsys, tmp_path, monkeypatch):
+    """`--tolerance` and `--iterations` reach the bed in every command that takes a scene."""
+    path, beds = tmp_path / "own.xml", []
+    path.write_text(FLOOR)
+
+    def staged(scene, **options):
+        beds.append(instances(scenes.stage(scene, **options).model)[0].bed)
+        raise RftsimError("seen")
+
+    asked = "--tolerance", 1e-4, "--iterations", 40
+    told = json.loads(call(capsys, "inspect", path, "--json", *asked)[1])
+    assert (told["tolerance"], told["iterations"]) == (1e-4, 40)
+    assert "solved to 0.0001 of a body's velocity, in 40 iterations" in call(capsys, "inspect", path, *asked)[1]
+    monkeypatch.setattr("rftsim.cli.scene.stage", staged)
+    for scene, command in itertools.product((path, "intruder"), ("run", "drop", "view", "inspect")):
+        for more, expected in ((), (3e-3, 20)), (asked, (1e-4, 40)):
+            assert "seen" in call(capsys, command, scene, *more)[2]
+            assert (beds[-1].tolerance, beds[-1].iterations) == expected
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--tolerance", 0), "reduction=0 keeps every triangle"),
+        (("--tolerance", 0.5), "tolerance is that of the implicit force, 1e-06 to 0.1, not 0.5"),
+        (("--iterations", 0), "iterations must be a whole number from 1 to 60, not 0"),
+        (("--iterations", 2.5), "2.5"),
+    ],
+)
+def test_solutions_that_cannot_be(capsys, arguments, words):
+    code, out, err = call(capsys, "run", "intruder", *arguments)
+    assert (code, out) == (2, "")
+    assert words in err
 
 
 def test_bad_xml_is_an_error_not_a_trace(capsys, tmp_path):

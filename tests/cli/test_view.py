@@ -14,6 +14,7 @@ import pytest
 from test_cli import call
 
 import rftsim
+from rftsim.run.robot import measure, total_force
 from rftsim.run.scenes import stage
 from rftsim.run.start import begin
 from rftsim.view import live
@@ -69,6 +70,17 @@ def test_the_loop_shows_a_robot_that_stands(shown):
     assert "% of 117.7 N" in handle.texts[3]
     assert handle.texts[2].count("\n") == handle.texts[3].count("\n")
     live.follow(shown, FakeHandle(shown.model, 10_000), seconds=0.1)
+
+
+def test_the_share_is_along_the_sands_normal(path):
+    """On a slope, as the measures of a robot have it."""
+    staged = stage(str(path), terrain=rftsim.FreeSurface(normal=(1.0, 0.0, 1.0)))
+    shown = live.Live(staged.model, functools.partial(begin, staged))
+    for _ in range(4):
+        shown.advance(0.02, mujoco.MjvPerturb())
+    robot = measure(staged.model, shown.data, "box")
+    assert robot.carried != pytest.approx(total_force(staged.model, shown.data)[2] / robot.weight, abs=0.02)
+    assert f"{100 * robot.carried:.0f} % of 117.7 N" in shown.texts()[1]
 
 
 def test_keys(shown):

@@ -89,15 +89,15 @@ def test_no_pose_within_the_ranges_comes_nearer():
                 assert (world @ sand.normal).min() - sand.offset >= bounds[name] - 1e-9
 
 
-def test_a_tolerance_leaves_out_what_cannot_reach_the_sand():
+def test_reduction_leaves_out_what_cannot_reach_the_sand():
     """At zero every moving body is modelled; otherwise those out of reach are not, unless they are named."""
     moving = {"crane", "jib", "hook", "lamp", "lift", "rope", "cart", "block"}
-    assert set(add_sand(spec_of(CRANE), SAND, tolerance=0.0).surfaces) == moving
-    bed = add_sand(spec_of(CRANE), SAND, tolerance=0.2)
+    assert set(add_sand(spec_of(CRANE), SAND, reduction=0.0).surfaces) == moving
+    bed = add_sand(spec_of(CRANE), SAND, reduction=0.2)
     assert set(bed.surfaces) == {"hook", "rope", "block"}
     assert bed.reasons["lift"] == "stays 0.57 m or more above the sand, by its tree and its joints' ranges"
     assert bed.reasons["pillar"] == "cannot move"
-    assert set(add_sand(spec_of(CRANE), SAND, tolerance=0.2, bodies=["lift"]).surfaces) == {"lift"}
+    assert set(add_sand(spec_of(CRANE), SAND, reduction=0.2, bodies=["lift"]).surfaces) == {"lift"}
 
 
 def test_nothing_within_reach_is_said():
@@ -107,11 +107,11 @@ def test_nothing_within_reach_is_said():
     assert list(bed.surfaces) == ["b"]
 
 
-@pytest.mark.parametrize("tolerance", [-0.1, 1.0, np.nan])
-def test_tolerances_that_cannot_be(tolerance):
+@pytest.mark.parametrize("share", [-0.1, 1.0, np.nan])
+def test_reductions_that_cannot_be(share):
     """It is a share."""
-    with pytest.raises(SceneError, match="tolerance must be zero, or below 1"):
-        add_sand(spec_of(), SAND, tolerance=tolerance)
+    with pytest.raises(SceneError, match="reduction must be zero, or below 1"):
+        add_sand(spec_of(), SAND, reduction=share)
 
 
 def test_a_wheel_on_its_carriage_turns_in_its_plane():
@@ -132,10 +132,10 @@ def test_a_free_body_goes_everywhere():
     np.testing.assert_allclose(reach.motions, np.tile(np.eye(6), (len(reach.motions), 1, 1)), atol=1e-9)
 
 
-def test_a_model_under_a_tolerance_is_a_model():
+def test_a_reduced_model_is_a_model():
     """Fewer elements, near the same force; readouts and the bounding box follow."""
     drop = xml('<body name="b" pos="0 0 .03"><freejoint/><geom type="ellipsoid" size=".1 .06 .05"/></body>')
-    models = [rftsim.load(drop, SAND, max_edge=0.004, tolerance=tolerance) for tolerance in (0.0, 0.05)]
+    models = [rftsim.load(drop, SAND, max_edge=0.004, reduction=share) for share in (0.0, 0.05)]
     counts, rest = [], []
     for model in models:
         data = mujoco.MjData(model)
@@ -173,7 +173,7 @@ def searches(monkeypatch, tmp_path):
 
 def test_equal_legs_are_reduced_once(searches):
     """Bodies of one shape, whose tree is free, share a search; the next load needs none."""
-    first, again = (add_sand(spec_of(TABLE), SAND, tolerance=0.05) for _ in range(2))
+    first, again = (add_sand(spec_of(TABLE), SAND, reduction=0.05) for _ in range(2))
     assert len(searches) == 2
     for i in range(4):
         assert first.economies[f"leg{i}"].elements < first.economies[f"leg{i}"].triangles
@@ -198,15 +198,13 @@ def test_a_robot_is_reduced_in_seconds(searches):
     if not path.is_file():
         pytest.skip(f"no {path}")
     times = []
-    for tolerance in (0.0, 0.01, 0.01):
+    for share in (0.0, 0.01, 0.01):
         spec = read_spec(path)
         start = time.process_time()
-        add_sand(spec, tolerance=tolerance)
+        add_sand(spec, reduction=share)
         times.append(time.process_time() - start)
     plain, first, again = times
-    print(
-        f"{len(searches)} searches; {plain:.2f} s without a tolerance, {first:.2f} s with it, {again:.2f} s once known"
-    )
+    print(f"{len(searches)} searches; {plain:.2f} s without reduction, {first:.2f} s with it, {again:.2f} s once known")
     assert first - plain < 5.0
     assert again - plain < 0.2 * (first - plain)
 
@@ -234,18 +232,23 @@ def test_laws_for_a_wheel(scene, law, rpm, advised):
 def test_laws_for_a_robot(speed, law, number):
     """A free robot needs a 3D law; its speed, v / sqrt(g L) of its smallest body, decides on the dynamic terms."""
     spec = hexapod.build_hexapod()
-    bed = add_sand(spec, tolerance=0.0)
+    bed = add_sand(spec, reduction=0.0)
     dimensions, dynamics = advise(spec.compile(), bed, speed)
     assert dimensions.law == "rft3d"
     assert dynamics.law == law
     assert number in dynamics.reason
 
 
-def test_a_flat_law_in_space_is_advised_against():
-    """A 2D law does not feel what moves across its plane."""
-    spec = spec_of()
-    bed = add_sand(spec, SAND, "rft2d", tolerance=0.0)
-    assert [one.law for one in advise(spec.compile(), bed)] == ["rft3d", "rft2d"]
+@pytest.mark.parametrize(("plane", "named"), [((0, -1, 0), "x-z plane"), ((3, 4, 0), "plane of motion")])
+def test_a_flat_law_serves_in_its_own_plane(plane, named):
+    """Whatever it is: nothing that feels a 2D law can leave it."""
+    along, about = np.cross(plane, (0, 0, 1)), np.array(plane)
+    axes = [" ".join(map(str, axis)) for axis in (along, about)]
+    spec = spec_of(f'<body><joint type="slide" axis="{axes[0]}"/><joint axis="{axes[1]}"/><geom size=".1"/></body>')
+    bed = add_sand(spec, SAND, "rft2d", plane=plane)
+    dimensions, dynamics = advise(spec.compile(), bed)
+    assert (dimensions.law, dynamics.law) == ("rft2d", "rft2d")
+    assert f"in the {named}: a 2D law serves" in dimensions.reason
 
 
 def test_advice_is_written_as_json():

@@ -18,7 +18,7 @@ MESH = f'<asset><mesh name="slab" scale="2 2 .1" vertex="{CORNERS}"/></asset>'
 
 
 def bed_of(mjcf, option="", extra="", **options):
-    return add_sand(spec_of(mjcf, option, extra), SAND, **{"tolerance": 0.0} | options)
+    return add_sand(spec_of(mjcf, option, extra), SAND, **{"reduction": 0.0} | options)
 
 
 def settled(mjcf, option="", extra="", **options):

@@ -4,9 +4,9 @@ import mujoco
 import numpy as np
 import pytest
 from shapes import about
-from trees import BALL, SAND, sandy, shaken, spec_of
+from trees import BALL, JOINTS, SAND, sandy, shaken, spec_of
 
-from rftsim import FreeSurface, SceneError, add_sand, instances, tractions, wrenches
+from rftsim import FreeSurface, SceneError, add_sand, instances, surface_force, tractions, wrenches
 from rftsim.surface.triangles import Wheel
 
 WHEEL = """
@@ -18,8 +18,11 @@ WHEEL = """
   </body>"""
 
 
+BOX = '<body name="b" pos="0 0 -.2">{}<geom type="box" size=".1 .05 .03"/></body>'
+
+
 def bed_of(mjcf, option="", sand=SAND, law="rft3d", **options):
-    return add_sand(spec_of(mjcf, option), sand, law, **{"tolerance": 0.0} | options)
+    return add_sand(spec_of(mjcf, option), sand, law, **{"reduction": 0.0} | options)
 
 
 # Surfaces -------------------------------------------------------------------------------------------------------------
@@ -31,7 +34,7 @@ def test_surface_is_that_of_the_geoms():
     sizes = {"sphere": ".1", "box": ".1 .2 .05", "ellipsoid": ".1 .2 .05", "cylinder": ".1 .2", "capsule": ".1 .2"}
     for kind, size in sizes.items():
         spec = spec_of(f'<body name="b"><freejoint/><geom type="{kind}" size="{size}" {place}/></body>')
-        surface, model = add_sand(spec, SAND, tolerance=0.0).surfaces["b"], spec.compile()
+        surface, model = add_sand(spec, SAND, reduction=0.0).surfaces["b"], spec.compile()
         vector = surface.normals * surface.areas[:, None]
         np.testing.assert_allclose(vector.sum(axis=0), 0.0, atol=1e-12)
         volume = np.einsum("ij,ij->", surface.centres, vector) / 3.0
@@ -99,55 +102,49 @@ def test_wheels_that_cannot():
 @pytest.mark.parametrize("law", ["rft2d", "drft2d"])
 def test_sides_carry_nothing_in_the_plane(law):
     """2D laws press on area vectors projected onto the plane of motion: a box's sides feel nothing."""
-    model = sandy('<body name="b" pos="0 0 -.2"><freejoint/><geom type="box" size=".1 .05 .03"/></body>', law=law)
-    data = mujoco.MjData(model)
-    data.qvel[:3] = 1.0, 5.0, -0.5
-    mujoco.mj_forward(model, data)
-    faces = tractions(model, data, "b")
-    sides = np.abs(faces.normal[:, 1]) > 0.5
-    assert not faces.stress[sides].any()
-    assert faces.stress[~sides].any()
-    found = wrenches(model, data)
-    assert found.force[1, 1] == pytest.approx(0.0, abs=1e-9)
-    np.testing.assert_allclose(found.moment[1, [0, 2]], 0.0, atol=1e-9)
+    box = bed_of(BOX.format("<freejoint/>")).surfaces["b"]
+    found = surface_force(box, SAND, law, position=(0, 0, -0.2), velocity=(1.0, 5.0, -0.5))
+    sides = np.abs(box.normals[:, 1]) > 0.5
+    assert not found.stress[sides].any()
+    assert found.stress[~sides].any()
+    assert found.force[1] == pytest.approx(0.0, abs=1e-9)
+    np.testing.assert_allclose(found.moment[[0, 2]], 0.0, atol=1e-9)
 
 
 def test_faces_that_a_planar_law_never_feels_are_left_out():
-    """Where a body cannot leave the plane of motion, its sides are dropped, and the force is that of all faces."""
-    body = '<body name="b" pos="0 0 -.2">{}<geom type="box" size=".1 .05 .03"/></body>'
-    slides = '<joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/><joint axis="0 1 0"/>'
-    kept, whole = (bed_of(body.format(joint), law="rft2d") for joint in (slides, "<freejoint/>"))
+    """A body that stays in the plane of motion has no sides, and the force is that of all faces."""
+    box = BOX.format(JOINTS["planar"])
+    kept, whole = bed_of(box, law="rft2d"), bed_of(box).surfaces["b"]
     assert "are parallel to it and left out" in kept.reasons["b"]
-    assert np.abs(kept.surfaces["b"].normals[:, 1]).max() < 0.5 < np.abs(whole.surfaces["b"].normals[:, 1]).max()
-    assert bed_of(body.format(slides)).surfaces["b"].ntri == whole.surfaces["b"].ntri
-    forces = []
-    for joint, dofs in ((slides, (0, 1, 2)), ("<freejoint/>", (0, 2, 4))):
-        model = sandy(body.format(joint), law="rft2d")
-        data = mujoco.MjData(model)
-        data.qvel[list(dofs)] = 1.0, -0.5, 2.0
-        mujoco.mj_forward(model, data)
-        forces.append(data.qfrc_passive[list(dofs)])
-    np.testing.assert_allclose(*forces, rtol=1e-9)
+    assert np.abs(kept.surfaces["b"].normals[:, 1]).max() < 0.5 < np.abs(whole.normals[:, 1]).max()
+    model = sandy(box, law="rft2d")
+    data = mujoco.MjData(model)
+    data.qvel[:] = 1.0, -0.5, 2.0
+    mujoco.mj_forward(model, data)
+    motion = {"velocity": (1.0, 0.0, -0.5), "angular_velocity": (0.0, 2.0, 0.0)}
+    found = surface_force(whole, SAND, "rft2d", position=(0, 0, -0.2), **motion)
+    np.testing.assert_allclose(data.qfrc_passive, [found.force[0], found.force[2], found.moment[1]], rtol=1e-9)
 
 
 def test_slopes_across_the_default_plane():
     """A 3D law needs no plane of motion, so the surface may tilt any way; a planar law needs one along the slope."""
     slope = FreeSurface(normal=(0.0, 0.2, 1.0))
     bed_of(BALL, terrain=slope)
-    bed_of(BALL, law="rft2d", terrain=slope, plane=(1, 0, 0))
+    planar = BOX.format('<joint type="slide" axis="0 1 0"/><joint type="slide" axis="0 0 1"/><joint axis="1 0 0"/>')
+    bed_of(planar, law="rft2d", terrain=slope, plane=(1, 0, 0))
     with pytest.raises(ValueError, match="plane of motion"):
-        bed_of(BALL, law="rft2d", terrain=slope)
+        bed_of(planar, law="rft2d", terrain=slope)
 
 
 def test_planes_may_be_turned():
     """A scene and its plane turned about the vertical feel the turned force."""
     turn = about((0, 0, 1), 0.7)
     forces = []
-    for r in (np.eye(3), turn):
-        model = sandy(law="rft2d", plane=r @ [0, 1, 0])
+    for angle, r in ((0.0, np.eye(3)), (0.7, turn)):
+        box = BOX.replace("<body ", f'<body euler="0 0 {np.degrees(angle)}" ').format(JOINTS["planar"])
+        model = sandy(box, law="rft2d", plane=r @ [0, 1, 0])
         data = mujoco.MjData(model)
-        mujoco.mju_mat2Quat(data.qpos[3:7], r.ravel())
-        data.qvel[:3] = r @ [1, 0.3, -0.5]
+        data.qvel[:] = 1.0, -0.5, 0.3
         mujoco.mj_forward(model, data)
         forces.append(wrenches(model, data).force[1])
     np.testing.assert_allclose(forces[1], turn @ forces[0], rtol=1e-9, atol=1e-9)

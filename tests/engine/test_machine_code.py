@@ -27,7 +27,7 @@ import rftsim
 from rftsim_models import wheels
 
 spec = wheels.build_wheel(wheels.GROUSER_WHEEL, 30.0)
-rftsim.add_sand(spec, tolerance=0.0)  # every triangle, as ever here: no search for fewer elements in the time
+rftsim.add_sand(spec, reduction=0.0)  # every triangle, as ever here: no search for fewer elements in the time
 model = spec.compile()
 data = mujoco.MjData(model)
 data.qpos[model.joint("z").qposadr] = -0.02

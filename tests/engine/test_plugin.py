@@ -8,6 +8,7 @@ import pytest
 from trees import BALL, JOINTS, SAND, applied, sandy, shaken, spec_of, trajectory, tree
 
 from rftsim import add_sand, instances, surface_force, tractions, wrenches
+from rftsim.law.laws import get_law
 
 
 @pytest.fixture(params=["explicit", "implicit"])
@@ -64,7 +65,9 @@ def test_passive_forces_of_the_model_are_kept():
 @pytest.mark.parametrize("law", ["rft2d", "drft2d", "rft3d", "drft3d", "rft3d:c4", "drft3d:c4"])
 def test_one_number_everywhere(law):
     """Sensor = wrench = sum of tractions = `surface_force` of the same surface, pose and twist."""
-    spec = spec_of(tree(np.random.default_rng(5), ["free", "hinge", "none"]))
+    planar = get_law(law).planar
+    kinds = ["planar", "pitch", "none"] if planar else ["free", "hinge", "none"]
+    spec = spec_of(tree(np.random.default_rng(5), kinds, planar=planar))
     bed = add_sand(spec, SAND, law, terrain=0.1, force="explicit")
     model = spec.compile()
     data = shaken(model, 4)

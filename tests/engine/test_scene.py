@@ -21,7 +21,7 @@ CAST = (
 
 
 def bed_of(mjcf, option="", sand=SAND, law="rft3d", **options):
-    return add_sand(spec_of(mjcf, option), sand, law, **{"tolerance": 0.0} | options)
+    return add_sand(spec_of(mjcf, option), sand, law, **{"reduction": 0.0} | options)
 
 
 # Which bodies ---------------------------------------------------------------------------------------------------------
@@ -90,7 +90,7 @@ def test_body_with_another_plugin():
     add_sand(spec, SAND, bodies=["ball"])
     with pytest.raises(SceneError, match="give this bed another name"):
         add_sand(spec, SAND)
-    bed = add_sand(spec, SAND, name="second", tolerance=0.0)
+    bed = add_sand(spec, SAND, name="second", reduction=0.0)
     assert list(bed.surfaces) == ["arm", "shell"]
     assert bed.reasons["ball"] == "has another plugin, or sand already"
 

@@ -18,7 +18,7 @@ STAR_FACES = "0 2 1 0 1 3 0 3 2 1 2 4 2 3 4 3 1 4"
 
 
 def bed_of(mjcf, option="", **options):
-    return add_sand(spec_of(mjcf, option), SAND, **{"tolerance": 0.0} | options)
+    return add_sand(spec_of(mjcf, option), SAND, **{"reduction": 0.0} | options)
 
 
 def mesh_body(faces=STAR_FACES, **attributes):

@@ -27,7 +27,7 @@ def median_ratio(slow, fast, repeats=15):
 def test_a_buried_triangle_costs_less_than_a_thirtieth_of_numpys():
     """A whole step with 20000 buried triangles takes under 1/30 of NumPy's time for the same forces."""
     spec = spec_of(EGG)
-    surface = add_sand(spec, SAND, max_edge=0.008, tolerance=0.0, force="explicit").surfaces["b"]
+    surface = add_sand(spec, SAND, max_edge=0.008, reduction=0.0, force="explicit").surfaces["b"]
     assert 20_000 < surface.ntri < 25_000
     model = spec.compile()
     data = mujoco.MjData(model)

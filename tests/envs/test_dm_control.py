@@ -208,13 +208,13 @@ def test_the_reward_shows_in_the_wheels_colour():
 
 
 def test_the_arenas_sand_is_add_sands():
-    arenas = dm.SandArena(sand="poppy-seeds"), composer.Arena()
+    arenas = dm.SandArena(sand="poppy-seeds", tolerance=1e-4, iterations=40), composer.Arena()
     for arena in arenas:
         ball = mjcf.RootElement(model="ball")
         ball.worldbody.add("geom", type="sphere", size=[0.05], mass=1.0)
         arena.add_free_entity(composer.ModelWrapperEntity(ball)).pos = [0.0, 0.0, 0.05]
     spec = mujoco.MjSpec.from_string(arenas[1].mjcf_model.to_xml_string())
-    rftsim.add_sand(spec, "poppy-seeds")
+    rftsim.add_sand(spec, "poppy-seeds", tolerance=1e-4, iterations=40)
     one, other = mjcf.Physics.from_mjcf_model(arenas[0].mjcf_model).model.ptr, spec.compile()
     np.testing.assert_array_equal(one.numeric_data, other.numeric_data)
     states = []

@@ -105,6 +105,12 @@ def test_only_what_is_asked_for_has_sand():
         assert env.physics.model.nplugin == 0
 
 
+def test_options_of_the_implicit_force_are_passed_on():
+    env = dm.on_sand("walker", "walk", tolerance=1e-4, iterations=40, **COARSE)
+    bed = rftsim.instances(env.physics.model.ptr)[0].bed
+    assert (bed.tolerance, bed.iterations) == (1e-4, 40)
+
+
 def test_what_cannot_be_is_said_in_a_line():
     with pytest.raises(rftsim.SceneError, match="'terrain' is a height field"):
         dm.on_sand("quadruped", "escape")

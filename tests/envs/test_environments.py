@@ -13,6 +13,8 @@ from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from rftsim_envs import IDS, TASKS, ConfigError, SandEnv, SandVectorEnv
 
+from rftsim import instances
+
 VARIED = {"strength": (0.7, 1.5), "friction": (0.8, 1.0), "slope_deg": 5.0}
 
 
@@ -140,11 +142,22 @@ def test_every_field_is_documented(task):
         ({"slope_deg": 60}, "below 45"),
         ({"sand": "fudge"}, "no sand 'fudge'"),
         ({"duration": "long"}, "finite number"),
+        ({"tolerance": 0}, "tolerance is that of the implicit force, 1e-06 to 0.1, not 0.0"),
+        ({"tolerance": 0.2}, "not 0.2"),
+        ({"iterations": 61}, "iterations must be a whole number from 1 to 60, not 61"),
+        ({"iterations": 2.5}, "iterations must be a whole number, not 2.5"),
     ],
 )
 def test_wrong_settings(settings, words):
     with pytest.raises((ConfigError, ValueError), match=words):
         gym.make(IDS[0], **settings)
+
+
+def test_the_solution_of_the_implicit_force(task):
+    """Settings, as numbers or as text, reach the bed."""
+    for settings, expected in ({}, (3e-3, 20)), ({"tolerance": "1e-4", "iterations": "40"}, (1e-4, 40)):
+        (one,) = instances(SandEnv(task, **settings).unwrapped.model)
+        assert (one.bed.tolerance, one.bed.iterations) == expected
 
 
 def test_unknown_task():

@@ -102,8 +102,16 @@ def test_contact_forces_are_the_sands():
     assert info["reward_contact"] < 0.0
 
 
+def test_options_of_the_implicit_force_are_passed_on():
+    env = rftsim_envs.on_sand("Hopper-v5", tolerance=1e-4, iterations=40)
+    bed = rftsim.instances(env.unwrapped.model)[0].bed
+    assert (bed.tolerance, bed.iterations) == (1e-4, 40)
+    with pytest.raises(rftsim.SceneError, match="reduction=0 keeps every triangle"):
+        rftsim_envs.on_sand("Hopper-v5", tolerance=0.0)
+
+
 def test_floors_can_stay():
-    env = rftsim_envs.on_sand("Hopper-v5", terrain=-1.0, keep_floor=True, tolerance=0.0, reset_noise_scale=0.0)
+    env = rftsim_envs.on_sand("Hopper-v5", terrain=-1.0, keep_floor=True, reduction=0.0, reset_noise_scale=0.0)
     random_steps(env, 20)
     assert env.unwrapped.data.ncon > 0
 

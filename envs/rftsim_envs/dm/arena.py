@@ -9,6 +9,7 @@ import numpy as np
 from dm_control import composer, mjcf
 from lxml import etree
 
+from rftsim.law import layout
 from rftsim.law.laws import Law
 from rftsim.model.add_sand import WHOLE, add_sand
 from rftsim.sand.medium import Sand
@@ -34,6 +35,8 @@ class SandArena(composer.Arena):
         geoms: Literal["collision", "all"] = "collision",
         max_edge: float | None = None,
         force: Literal["implicit", "explicit"] = "implicit",
+        tolerance: float = layout.TOLERANCE,
+        iterations: int = layout.ITERATIONS,
         name: str = "sand",
     ) -> None:
         """Build the arena.
@@ -47,6 +50,8 @@ class SandArena(composer.Arena):
             geoms: Which geoms bound a body: those that can collide, or all.
             max_edge: Longest edge of a triangle [m]; by default a sixth of each geom's size.
             force: `implicit` or `explicit`, see `rftsim.add_sand`.
+            tolerance: Error of a body's velocity, relative, to which the implicit force is solved for, 1e-6 to 0.1.
+            iterations: Most iterations of one such solution, 1 to 60.
             name: Name of the arena.
         """
         super()._build(name=name)
@@ -58,6 +63,8 @@ class SandArena(composer.Arena):
             "geoms": geoms,
             "max_edge": max_edge,
             "force": force,
+            "tolerance": tolerance,
+            "iterations": iterations,
         }
         root = _SandyModel(options, self.mjcf_model)
         root.visual.headlight.set_attributes(ambient=[0.45] * 3, diffuse=[0.35] * 3)
