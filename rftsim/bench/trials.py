@@ -81,9 +81,14 @@ class Trial:
     @property
     def failed(self) -> bool:
         """Whether MuJoCo reset the simulation, or would have."""
-        kinds = mujoco.mjtWarning
-        bad = (kinds.mjWARN_BADQPOS, kinds.mjWARN_BADQVEL, kinds.mjWARN_BADQACC)
-        return any(self.data.warning[kind].number for kind in bad)
+        return is_lost(self.data)
+
+
+def is_lost(data: mujoco.MjData) -> bool:
+    """Whether MuJoCo reset a simulation, or would have: a position, velocity or acceleration was not finite or huge."""
+    kinds = mujoco.mjtWarning
+    bad = (kinds.mjWARN_BADQPOS, kinds.mjWARN_BADQVEL, kinds.mjWARN_BADQACC)
+    return any(data.warning[kind].number for kind in bad)
 
 
 @dataclasses.dataclass(frozen=True)
