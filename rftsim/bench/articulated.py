@@ -13,6 +13,7 @@ from typing import Final
 import mujoco
 import numpy as np
 
+from rftsim.bench.random_trees import Random, add_tree, between, one_of
 from rftsim.bench.trials import Force, is_lost
 from rftsim.errors import RftsimNote, RftsimWarning
 from rftsim.model.add_sand import WHOLE, add_sand
@@ -22,33 +23,13 @@ from rftsim.surface.triangles import Array
 
 LAWS: Final = ("rft3d", "drft3d")
 """Laws that the sand of a scene may have."""
-SIZES: Final = (0.02, 0.15)
-"""Smallest and largest edge or diameter of a geom [m]."""
-DENSITIES: Final = (300.0, 3000.0)
-"""Range of the density of a geom [kg/m^3]."""
-MASSES: Final = (0.01, 5.0)
-"""Range that the mass of a geom is kept in [kg]."""
 FREQUENCIES: Final = (0.5, 15.0)
 """Range of the natural frequency of a spring with the inertia that it moves [Hz]."""
 SERVOS: Final = (2.0, 20.0)
 """Range of the same of a servo [Hz]."""
-APART: Final = 0.3
-"""Distance of the trees along x and y [m]."""
-
 SLOPE: Final = 20.0
 """Largest slope of the free surface [deg]."""
 
-_Random = np.random.Generator
-_JOINTS: Final = {
-    (mujoco.mjtJoint.mjJNT_HINGE,): 0.5,
-    (mujoco.mjtJoint.mjJNT_BALL,): 0.2,
-    (mujoco.mjtJoint.mjJNT_SLIDE,): 0.15,
-    (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_HINGE): 0.1,
-    (mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE): 0.05,
-}
-_SHAPES: Final = tuple(
-    getattr(mujoco.mjtGeom, f"mjGEOM_{name}") for name in ["BOX", "SPHERE", "CAPSULE", "CYLINDER", "ELLIPSOID"]
-)
 _MOVED: Final = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
 
 
@@ -124,12 +105,12 @@ def articulated(seed: int) -> Scene:
     random = np.random.default_rng(seed)
     spec = mujoco.MjSpec()
     spec.option.integrator = getattr(
-        mujoco.mjtIntegrator, f"mjINT_{_one_of(random, 'EULER', 'IMPLICITFAST', 'IMPLICIT')}"
+        mujoco.mjtIntegrator, f"mjINT_{one_of(random, 'EULER', 'IMPLICITFAST', 'IMPLICIT')}"
     )
-    spec.option.cone = getattr(mujoco.mjtCone, f"mjCONE_{_one_of(random, 'PYRAMIDAL', 'ELLIPTIC')}")
+    spec.option.cone = getattr(mujoco.mjtCone, f"mjCONE_{one_of(random, 'PYRAMIDAL', 'ELLIPTIC')}")
     touching = random.uniform() < 0.5
     for tree in range(int(random.integers(1, 4))):
-        _add_tree(spec, random, tree, touching)
+        add_tree(spec, random, tree, touching)
     draft = spec.copy().compile()
     _add_springs(spec, draft, random)
     amplitude = _add_servos(spec, draft, random)
@@ -144,7 +125,7 @@ def articulated(seed: int) -> Scene:
         seed=seed,
         spec=spec,
         sand=_sand(random),
-        law=_one_of(random, *LAWS),
+        law=one_of(random, *LAWS),
         terrain=terrain,
         velocity=_velocity(draft, random),
         amplitude=amplitude,
@@ -153,16 +134,16 @@ def articulated(seed: int) -> Scene:
     )
 
 
-def _sand(random: _Random) -> Sand:
+def _sand(random: Random) -> Sand:
     return Sand(
         rho_c=random.uniform(1200.0, 1800.0),
         mu_surf=random.uniform(0.2, 0.6),
-        xi_n=_between(random, 1e5, 2e6),
+        xi_n=between(random, 1e5, 2e6),
         lambda_=random.uniform(1.0, 1.5),
     )
 
 
-def _terrain(random: _Random) -> FreeSurface:
+def _terrain(random: Random) -> FreeSurface:
     """A level surface, or a slope in three of ten scenes."""
     slope, way = math.radians(random.uniform(0.0, SLOPE)), random.uniform(0.0, 2.0 * math.pi)
     if random.uniform() > 0.3:
@@ -170,99 +151,34 @@ def _terrain(random: _Random) -> FreeSurface:
     return FreeSurface(normal=(math.sin(slope) * math.cos(way), math.sin(slope) * math.sin(way), math.cos(slope)))
 
 
-def _add_tree(spec: mujoco.MjSpec, random: _Random, tree: int, touching: bool) -> None:
-    """Add a tree: free, on a slide, or fixed to the world."""
-    base = random.choice(("free", "slide", "fixed"), p=(0.8, 0.1, 0.1))
-    place = [APART * (tree % 2), APART * (tree // 2), 0.0]
-    body = spec.worldbody.add_body(name=f"{tree}-0", pos=place, quat=_attitude(random))
-    if base == "free":
-        body.add_freejoint(name=f"{tree}-0")
-    elif base == "slide":
-        body.add_joint(name=f"{tree}-0", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=_direction(random))
-    bodies, sizes = [body], [_add_geom(body, random, touching)]
-    for i in range(1, int(random.integers(2 if base == "fixed" else 1, 9))):
-        parent = int(random.integers(max(0, i - 3), i))
-        body = bodies[parent].add_body(name=f"{tree}-{i}", quat=_attitude(random))
-        size = _add_geom(body, random, touching)
-        body.pos = 0.8 * (sizes[parent] + size) * _direction(random)
-        kinds = list(_JOINTS)
-        for k, kind in enumerate(kinds[random.choice(len(kinds), p=list(_JOINTS.values()))]):
-            name, hub = f"{tree}-{i}{'ab'[k]}", 0.7 * random.uniform(-size, size, 3)
-            _limit(body.add_joint(name=name, type=kind, axis=_direction(random), pos=hub), random)
-        bodies.append(body)
-        sizes.append(size)
-
-
-def _add_geom(body: mujoco.MjsBody, random: _Random, touching: bool) -> float:
-    """Add a geom to a body, and return half its length [m]; sometimes a second one beside it."""
-    kind, half = _SHAPES[random.integers(len(_SHAPES))], 0.5 * _between(random, *SIZES)
-    size = np.maximum(half * random.uniform(0.15, 1.0, 3), 0.5 * SIZES[0])
-    size[random.integers(3)] = half
-    if kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
-        size[:2] = max(min(size[0], 0.5 * half), 0.5 * SIZES[0]), half
-    volume = _volume(kind, size)
-    mass = float(np.clip(_between(random, *DENSITIES) * volume, *MASSES))
-    body.add_geom(type=kind, size=size, mass=mass, contype=touching, conaffinity=touching)
-    if random.uniform() < 0.15:
-        ball = [max(0.4 * half, 0.5 * SIZES[0]), 0.0, 0.0]
-        at = half * _direction(random)
-        body.add_geom(size=ball, pos=at, mass=MASSES[0], contype=touching, conaffinity=touching)
-    return half
-
-
-def _volume(kind: mujoco.mjtGeom, size: Array) -> float:
-    """Volume of a geom [m^3], by MuJoCo's sizes."""
-    a, b, c = size.tolist()
-    if kind == mujoco.mjtGeom.mjGEOM_BOX:
-        return float(8.0 * a * b * c)
-    if kind == mujoco.mjtGeom.mjGEOM_SPHERE:
-        return float(4.0 / 3.0 * math.pi * a**3)
-    if kind == mujoco.mjtGeom.mjGEOM_ELLIPSOID:
-        return float(4.0 / 3.0 * math.pi * a * b * c)
-    ends = 4.0 / 3.0 * math.pi * a**3 if kind == mujoco.mjtGeom.mjGEOM_CAPSULE else 0.0
-    return float(2.0 * math.pi * a * a * b + ends)
-
-
-def _limit(joint: mujoco.MjsJoint, random: _Random) -> None:
-    """Limit the range of a joint in four of ten."""
-    if random.uniform() > 0.4:
-        return
-    joint.limited = mujoco.mjtLimited.mjLIMITED_TRUE
-    ends = random.uniform(0.2, 1.5, 2)
-    if joint.type == mujoco.mjtJoint.mjJNT_BALL:
-        joint.range = [0.0, ends[0]]
-    else:
-        joint.range = (0.05 if joint.type == mujoco.mjtJoint.mjJNT_SLIDE else 1.0) * np.array([-ends[0], ends[1]])
-
-
-def _add_springs(spec: mujoco.MjSpec, draft: mujoco.MjModel, random: _Random) -> None:
+def _add_springs(spec: mujoco.MjSpec, draft: mujoco.MjModel, random: Random) -> None:
     """Give joints springs, dampers, armature and dry friction, each at random."""
     for joint in spec.joints:
         if joint.type == mujoco.mjtJoint.mjJNT_FREE:
             continue
-        inertia, rate = _inertia(draft, joint.name), 2.0 * math.pi * _between(random, *FREQUENCIES)
+        inertia, rate = _inertia(draft, joint.name), 2.0 * math.pi * between(random, *FREQUENCIES)
         shares = random.uniform(size=4)
         if shares[0] < 0.6:
-            _set(joint, "damping", 2.0 * _between(random, 0.01, 1.0) * rate * inertia)
+            _set(joint, "damping", 2.0 * between(random, 0.01, 1.0) * rate * inertia)
         if shares[1] < 0.3:
             _set(joint, "stiffness", inertia * rate**2)
         if shares[2] < 0.4:
-            joint.armature = _between(random, 0.01, 1.0) * inertia
+            joint.armature = between(random, 0.01, 1.0) * inertia
         if shares[3] < 0.2:
-            joint.frictionloss = inertia * _between(random, 1.0, 100.0)
+            joint.frictionloss = inertia * between(random, 1.0, 100.0)
 
 
-def _add_servos(spec: mujoco.MjSpec, draft: mujoco.MjModel, random: _Random) -> Array:
+def _add_servos(spec: mujoco.MjSpec, draft: mujoco.MjModel, random: Random) -> Array:
     """Add servos to most hinges and slides, of position or velocity, and return the amplitudes of their targets."""
     amplitudes = []
     for joint in spec.joints:
         if joint.type not in _MOVED or random.uniform() > 0.7:
             continue
         servo = spec.add_actuator(target=joint.name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
-        inertia, rate = _inertia(draft, joint.name), 2.0 * math.pi * _between(random, *SERVOS)
-        amplitude = _between(random, 0.2, 1.5) * (0.1 if joint.type == mujoco.mjtJoint.mjJNT_SLIDE else 1.0)
+        inertia, rate = _inertia(draft, joint.name), 2.0 * math.pi * between(random, *SERVOS)
+        amplitude = between(random, 0.2, 1.5) * (0.1 if joint.type == mujoco.mjtJoint.mjJNT_SLIDE else 1.0)
         if random.uniform() < 0.7:
-            servo.set_to_position(kp=inertia * rate**2, kv=2.0 * _between(random, 0.05, 1.0) * inertia * rate)
+            servo.set_to_position(kp=inertia * rate**2, kv=2.0 * between(random, 0.05, 1.0) * inertia * rate)
         else:
             servo.set_to_velocity(kv=inertia * rate)
             amplitude *= 5.0
@@ -270,7 +186,7 @@ def _add_servos(spec: mujoco.MjSpec, draft: mujoco.MjModel, random: _Random) -> 
     return np.array(amplitudes)
 
 
-def _close_loop(spec: mujoco.MjSpec, draft: mujoco.MjModel, random: _Random) -> None:
+def _close_loop(spec: mujoco.MjSpec, draft: mujoco.MjModel, random: Random) -> None:
     """Connect a point of the last body with a body of its tree that is not its neighbour, if there is one."""
     last = draft.nbody - 1
     tree = [
@@ -284,21 +200,21 @@ def _close_loop(spec: mujoco.MjSpec, draft: mujoco.MjModel, random: _Random) -> 
     spec.add_equality(type=kind, objtype=objects, **names).data[:3] = random.uniform(-0.03, 0.03, 3)
 
 
-def _add_tendon(spec: mujoco.MjSpec, draft: mujoco.MjModel, random: _Random) -> None:
+def _add_tendon(spec: mujoco.MjSpec, draft: mujoco.MjModel, random: Random) -> None:
     """Span a spring with a damper between two bodies."""
     if draft.nbody < 3:
         return
     ends = 1 + random.choice(draft.nbody - 1, 2, replace=False)
-    rate, mass = 2.0 * math.pi * _between(random, *FREQUENCIES), 1.0 / draft.body_invweight0[ends, 0].clip(1e-6).sum()
+    rate, mass = 2.0 * math.pi * between(random, *FREQUENCIES), 1.0 / draft.body_invweight0[ends, 0].clip(1e-6).sum()
     tendon = spec.add_tendon(name="spring", springlength=[random.uniform(0.0, 0.3)] * 2)
     _set(tendon, "stiffness", mass * rate**2)
-    _set(tendon, "damping", 2.0 * _between(random, 0.05, 1.0) * mass * rate)
+    _set(tendon, "damping", 2.0 * between(random, 0.05, 1.0) * mass * rate)
     for end in ends.tolist():
         spec.body(draft.body(end).name).add_site(name=f"end-{end}")
         tendon.wrap_site(f"end-{end}")
 
 
-def _set_heights(spec: mujoco.MjSpec, draft: mujoco.MjModel, terrain: FreeSurface, random: _Random) -> None:
+def _set_heights(spec: mujoco.MjSpec, draft: mujoco.MjModel, terrain: FreeSurface, random: Random) -> None:
     """Place each tree along the vertical: buried, half in the sand, or above it."""
     data = mujoco.MjData(draft)
     mujoco.mj_forward(draft, data)
@@ -316,7 +232,7 @@ def _set_heights(spec: mujoco.MjSpec, draft: mujoco.MjModel, terrain: FreeSurfac
         spec.body(draft.body(root).name).pos[2] += lift / terrain.normal[2]
 
 
-def _velocity(model: mujoco.MjModel, random: _Random) -> Array:
+def _velocity(model: mujoco.MjModel, random: Random) -> Array:
     """Velocities of all joints and spins of free bodies at random, none of them in a fifth of all scenes."""
     scale = random.choice((0.0, 0.5, 1.0, 2.0), p=(0.2, 0.3, 0.4, 0.1))
     velocity: Array = np.zeros(model.nv)
@@ -341,22 +257,3 @@ def _inertia(draft: mujoco.MjModel, joint: str) -> float:
 def _set(part: "mujoco.MjsJoint | mujoco.MjsTendon", name: str, value: float) -> None:
     """Set a stiffness or damping, of which newer versions of MuJoCo have polynomials."""
     setattr(part, name, value if isinstance(getattr(part, name), float) else [value, 0.0, 0.0])
-
-
-def _between(random: _Random, low: float, high: float) -> float:
-    """A number between two, log-uniform."""
-    return float(np.exp(random.uniform(np.log(low), np.log(high))))
-
-
-def _direction(random: _Random) -> Array:
-    vector: Array = random.normal(size=3)
-    return vector / np.linalg.norm(vector)
-
-
-def _attitude(random: _Random) -> Array:
-    quaternion: Array = random.normal(size=4)
-    return quaternion / np.linalg.norm(quaternion)
-
-
-def _one_of(random: _Random, *names: str) -> str:
-    return names[random.integers(len(names))]
