@@ -61,10 +61,10 @@ def weigh_solver(cases: tuple[str, ...], count: int, quick: bool, memory: Path, 
     console.print(_table(summarise(played)))
     print_line(
         console,
-        "n: simulations; evaluations: of the force and of its derivative in a step, in the mean; most: the most of the "
-        "force in one step; unsolved: equations over steps; work: the largest that the sand did in one step; share: over "
-        "the largest kinetic energy up to then; lost: simulations lost with sand though not without, and those lost "
-        "without. The environments' actions are random or swaying, or come from drives that see nothing",
+        "a step: evaluations of the force and of its derivative, in the mean; most: of the force, in one step; open: "
+        "unsolved equations over steps; J: largest work of the sand in one step; share: that over the largest kinetic "
+        "energy up to then; lost: simulations lost with sand though not without, and those lost without. The "
+        "environments' actions are random or swaying, or come from drives that see nothing",
     )
     for what, found in listed.items():
         told = (f"{one.member} at {1e3 * one.h:g} ms ({BY[what](one.effort):.3g})" for one in found)
@@ -73,13 +73,12 @@ def weigh_solver(cases: tuple[str, ...], count: int, quick: bool, memory: Path, 
 
 
 def _table(rows: list[Summary]) -> Table:
-    headings = ("n", "evaluations", "most", "unsolved", "work [J]", "share", "lost")
+    headings = ("a step", "most", "open", "J", "share", "lost")
     table = make_table(None, ("set",), headings)
     for i, row in enumerate(rows):
         table.add_row(
-            f"{row.group}, {1e3 * row.h:g} ms",
-            f"{row.simulations}",
-            f"{row.evaluations:.2f} + {row.derivatives:.2f}",
+            f"{row.simulations} {row.group}, {1e3 * row.h:g} ms",
+            f"{row.evaluations:.1f} + {row.derivatives:.1f}",
             f"{row.worst}",
             f"{row.unsolved:.1g}",
             f"{row.gain:.1g}",

@@ -5,7 +5,9 @@ import numpy as np
 import pytest
 
 import rftsim
+from rftsim.bench import solver
 from rftsim.bench.articulated import articulated
+from rftsim.bench.effort import Effort, Meter
 from rftsim.bench.trials import is_lost
 
 H = 5e-3
@@ -65,3 +67,59 @@ def test_sand_loses_no_scene(seed):
     assert scene.lost(H, 1.0) or not is_lost(data)
     assert np.isfinite(data.qpos).all()
     assert np.isfinite(rftsim.wrenches(model, data).force).all()
+
+
+def test_the_meter_counts_what_work_counts():
+    """Step by step, the meter adds up to the totals; its sand has done work against the motion."""
+    scene, meter = articulated(3), Meter()
+    model = scene.sandy(H)
+    data = scene.start(model)
+    meter.advance(model, data, nstep=40)
+    effort, spent = meter.effort(), rftsim.work(model, data)
+    assert (effort.steps, effort.evaluations, effort.derivatives) == (40, spent.evaluations, spent.derivatives)
+    assert effort.evaluations / 40 <= effort.worst <= effort.evaluations
+    assert effort.gain < 1e-3
+    assert not effort.lost
+
+
+def test_the_meter_stops_where_a_simulation_is_lost():
+    """A velocity that is no number ends it; the step is not counted."""
+    scene, meter = articulated(3), Meter()
+    model = scene.sandy(H)
+    data = scene.start(model)
+    meter.advance(model, data, nstep=3)
+    data.qvel[0] = np.nan
+    meter.advance(model, data, nstep=3)
+    assert (meter.effort().steps, meter.effort().lost) == (3, True)
+
+
+def test_the_study_is_remembered(tmp_path):
+    """A second run measures nothing; the worst are listed once each; what is lost bare does not count as lost."""
+    names, calls = ("a", "b"), []
+
+    def measure(name, h):
+        calls.append(name)
+        return Effort(10, 20, 5, 7 if name == "a" else 9, 1, 0.1, 0.2, name == "b", name == "b")
+
+    for _ in range(2):
+        played = solver.Study(tmp_path / "solver.json").play(
+            solver.Group("made up", names, measure), (1e-3, 5e-3), lambda _: None
+        )
+    assert len(calls) == 4
+    first, second = solver.summarise(played)
+    assert (first.h, second.h, first.evaluations, first.worst, first.unsolved) == (1e-3, 5e-3, 2.0, 9, 0.1)
+    assert (first.lost, first.lost_bare) == (0, 1)
+    assert solver.lost(played) == []
+    assert [one.member for one in solver.hardest(played, lambda effort: effort.worst)] == ["b", "a"]
+
+
+@pytest.mark.slow
+def test_random_scenes_are_cheap():
+    """Of 300 scenes, sand loses none, and no step of any takes long."""
+    group = solver.scenes(solver.SCENES)
+    played = [solver.Played(group.name, seed, H, group.measure(seed, H)) for seed in group.members]
+    (summary,) = solver.summarise(played)
+    assert [one.member for one in solver.lost(played)] == []
+    assert summary.worst <= 60, solver.hardest(played, lambda effort: effort.worst)
+    assert summary.evaluations <= 3.0
+    assert summary.unsolved <= 1e-4
