@@ -35,7 +35,8 @@ class Bench:
     study: tyro.conf.Positional[Literal["stability", "kernel", "environment", "pareto", "solver"]]
     """The study to run: what is measured, see above."""
     cases: tuple[str, ...] = ()
-    """Names of the hard cases that stability and solver play; by default all."""
+    """Names of the hard cases that stability and solver play, or of the cases that environment times (wheel, go1); by
+    default all."""
     starts: int = 1000
     """Random starts of a free body on legs, of stability."""
     scenes: int = 300
@@ -57,7 +58,7 @@ class Bench:
         if self.study == "kernel":
             time_kernel(self.quick, self.oracle, self.plot, self.json)
         elif self.study == "environment":
-            time_environment(self.quick, self.plot, self.json)
+            time_environment(self.cases, self.quick, self.plot, self.json)
         elif self.study == "pareto":
             compare_speeds(self.quick, self.memory, self.plot, self.json)
         elif self.study == "solver":
