@@ -19,7 +19,8 @@ class Bench:
     stability: the hard cases (rest, light legs, stiff servos, impacts, edges, constraints) at time steps from 0.1 to
     10 ms with the implicit and the explicit force, against the exact or converged answer.
 
-    environment: the time that sand adds to MuJoCo's step, in one simulation and in 256 side by side.
+    environment: the time that sand adds to MuJoCo's step, in one simulation and in 256 side by side: shipped robots,
+    free spheres, and robots of others where they are installed (gymnasium, dm_control, MENAGERIE_ROOT).
 
     pareto: laws, triangles and time steps: what each costs, and how far it is from the finest.
 

@@ -74,7 +74,7 @@ def time_environment(names: tuple[str, ...], quick: bool, plot: Path | None, jso
         console.print(_batch_table([row for row in rows if row.batch]))
     print_line(
         console,
-        f"µs: processor time of a step; x: over that without sand, throughput likewise; of explicit: over that with "
+        f"µs: processor time of a step; x: over that without sand, throughput likewise; expl.: over that with "
         f"the explicit force; real: times real time; work: evaluations and derivatives of the force in a step. Medians "
         f"of {rounds} repetitions, in turn",
     )
@@ -140,18 +140,18 @@ def _number(value: float) -> float | None:
 
 
 def _single_table(rows: list[Timed]) -> Table:
-    headings = ("ms", "triangles", "µs", "x", "of explicit", "real", "work")
-    table = make_table("one simulation", ("scene", "sand"), headings)
+    table = make_table("one simulation", ("scene", "sand"), ("µs", "x", "expl.", "real", "work"))
     for row in rows:
+        name, sand = _head(row)
+        first = {"none": name, "explicit": f"  {1e3 * row.h:g} ms", "implicit": f"  {row.triangles} triangles"}
         table.add_row(
-            *_head(row),
-            f"{1e3 * row.h:g}",
-            f"{row.triangles}",
-            f"{1e6 * row.seconds:.4g}",
-            f"{row.ratio:.2f}",
-            "lost" if row.lost else f"{row.over_explicit:.2f}" if row.sand == "implicit" else "",
-            f"× {row.realtime:.3g}",
-            f"{row.evaluations:.2f} + {row.derivatives:.2f}",
+            first[row.sand],
+            sand,
+            f"{1e6 * row.seconds:.4g}" if row.seconds < 9e-3 else f"{1e6 * row.seconds:.0f}",
+            "lost" if row.lost else f"{row.ratio:.1f}",
+            f"{row.over_explicit:.1f}" if row.sand == "implicit" else "",
+            f"{row.realtime:.3g}",
+            f"{row.evaluations:.1f} + {row.derivatives:.1f}",
             end_section=row.sand == GROUNDS[-1],
         )
     return table
