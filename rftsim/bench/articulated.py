@@ -7,15 +7,14 @@ can be stepped at 10 ms where there is no sand; `Scene.lost` of the bare model s
 import dataclasses
 import functools
 import math
-import warnings
 from typing import Final
 
 import mujoco
 import numpy as np
 
+from rftsim.bench.quiet import quiet
 from rftsim.bench.random_trees import Random, add_tree, between, one_of
 from rftsim.bench.trials import Force, is_lost
-from rftsim.errors import RftsimNote, RftsimWarning
 from rftsim.model.add_sand import WHOLE, add_sand
 from rftsim.sand.free_surface import FreeSurface
 from rftsim.sand.medium import Sand
@@ -68,9 +67,7 @@ class Scene:
     def sandy(self, h: float, force: Force = "implicit") -> mujoco.MjModel:
         """Compile the scene on its sand, at a time step [s]; what is doubtful about it is of no interest."""
         spec = self.spec.copy()
-        with warnings.catch_warnings():
-            for kind in (RftsimNote, RftsimWarning):
-                warnings.simplefilter("ignore", kind)
+        with quiet():
             options = {**WHOLE, "terrain": self.terrain}
             add_sand(spec, self.sand, self.law, force=force, sensors=False, draw=False, geoms="all", **options)
         model = spec.compile()

@@ -29,7 +29,7 @@ class Effort(NamedTuple):
     gain: float
     """Largest work of the sand in one step [J]; negative or zero where it never adds energy."""
     share: float
-    """Largest of that work over the largest kinetic energy up to then; zero where it never adds energy."""
+    """That work over the largest kinetic energy of the simulation; zero where it never adds energy."""
     lost: bool
     """Whether MuJoCo reset the simulation, or would have, or its positions are not finite."""
     lost_bare: bool
@@ -42,8 +42,7 @@ class Meter:
     def __init__(self) -> None:
         self.lost = False
         self._totals = np.zeros(4, dtype=int)
-        self._worst, self._gain, self._share = 0, -math.inf, 0.0
-        self._peak = 0.0
+        self._worst, self._gain, self._peak = 0, -math.inf, 0.0
         self._model: mujoco.MjModel | None = None
         self._beds: list[int] = []
 
@@ -57,8 +56,9 @@ class Meter:
         """The effort up to now; `lost` adds that what came of it is not finite."""
         steps, evaluations, derivatives, unsolved = self._totals.tolist()
         gain = self._gain if steps else 0.0
+        share = gain / self._peak if gain > 0.0 and self._peak > 0.0 else 0.0
         counts = steps, evaluations, derivatives, self._worst, unsolved
-        return Effort(*counts, gain, self._share, self.lost or lost, lost_bare)
+        return Effort(*counts, gain, share, self.lost or lost, lost_bare)
 
     def _step(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         if model is not self._model:  # as it takes longer to find the beds than to step a small model
@@ -75,8 +75,6 @@ class Meter:
         done = 0.5 * model.opt.timestep * float(sand @ (before + data.qvel))
         self._peak = max(self._peak, _energy(model, data, before), _energy(model, data, data.qvel))
         self._gain = max(self._gain, done)
-        if done > 0.0 and self._peak > 0.0:
-            self._share = max(self._share, done / self._peak)
 
     def _spent(self, data: mujoco.MjData) -> Any:
         """The numbers of `rftsim.work`, summed over the beds."""

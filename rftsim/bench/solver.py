@@ -66,7 +66,7 @@ class Summary(NamedTuple):
     gain: float
     """Largest work of the sand in one step [J]; negative or zero where it never adds energy."""
     share: float
-    """Largest of that work over the largest kinetic energy of its simulation up to then."""
+    """Largest of that work over the largest kinetic energy of its simulation."""
     lost: int
     """Simulations that are lost with sand, though not without."""
     lost_bare: int

@@ -63,7 +63,7 @@ def weigh_solver(cases: tuple[str, ...], count: int, quick: bool, memory: Path, 
         console,
         "a step: evaluations of the force and of its derivative, in the mean; most: of the force, in one step; open: "
         "unsolved equations over steps; J: largest work of the sand in one step; share: that over the largest kinetic "
-        "energy up to then; lost: simulations lost with sand though not without, and those lost without. The "
+        "energy of its simulation; lost: simulations lost with sand though not without, and those lost without. The "
         "environments' actions are random or swaying, or come from drives that see nothing",
     )
     for what, found in listed.items():
