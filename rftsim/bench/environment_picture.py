@@ -33,12 +33,14 @@ def plot_environment(rows: list[Timed], path: Path) -> None:
             label = f"{force}, {threads} thread{'s' if threads > 1 else ''}"
             right.bar(at, shares, 0.16, color=colour, alpha=1.0 - 0.5 * j, label=label)
     left.set_yscale("log")
-    left.set_yticks([1, 2, 3, 5, 10, 20, 30, 100], ["1", "2", "3", "5", "10", "20", "30", "100"])
+    ticks = [1, 2, 3, 5, 10, 20, 30, 100, 300, 1000]
+    left.set_yticks(ticks, [f"{tick}" for tick in ticks])
     left.set_ylabel("step, over that without sand")
     right.set_ylabel(f"throughput of {SIMULATIONS}, over that without sand")
     for axis, names in ((left, cases), (right, batched)):
         axis.set_xticks(np.arange(len(names)), [f"{name}\n{law}" for name, law in names], rotation=90)
         axis.grid(alpha=0.3, axis="y")
-        axis.legend()
+    left.legend(loc="upper left")
+    right.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, fontsize="small")
     figure.suptitle("What sand adds to MuJoCo's step (dashed: what the wheel was asked to keep)")
     save_figure(figure, path)
