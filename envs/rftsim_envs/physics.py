@@ -63,11 +63,19 @@ class Physics(Protocol):
 
 
 class One:
-    """One simulation, on data of its own."""
+    """One simulation, on data of its own.
 
-    def __init__(self, model: mujoco.MjModel) -> None:
+    Args:
+        model: Model that is simulated; it is not copied.
+        advance: Takes a time step, as `mujoco.mj_step` does.
+    """
+
+    def __init__(
+        self, model: mujoco.MjModel, advance: Callable[[mujoco.MjModel, mujoco.MjData], None] = mujoco.mj_step
+    ) -> None:
         self.model = self.shown = model
         self.data, self.n = mujoco.MjData(model), 1
+        self._advance = advance
 
     def field(self, name: str) -> Array:
         """A field of MjData as a view with a first axis of one simulation, (1, ...)."""
@@ -86,7 +94,7 @@ class One:
         failed = False
         for k in range(nstep):
             if not failed:
-                mujoco.mj_step(self.model, self.data)
+                self._advance(self.model, self.data)
                 failed = bool(self.failed()[0])
             force[0, k], rate[0, k] = self.data.actuator_force, self.data.actuator_velocity
         return _mean_power(force, rate)

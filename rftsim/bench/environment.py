@@ -4,13 +4,16 @@ import functools
 import math
 import statistics
 import time
-from collections.abc import Callable
-from typing import Any, Final, Literal, NamedTuple
+from collections.abc import Callable, Iterable
+from typing import Any, Final, NamedTuple
 
 import mujoco
 import numpy as np
 
-from rftsim.bench.subjects import SUBJECTS, in_motion, put
+from rftsim.bench import others
+from rftsim.bench.cases import GROUNDS, OWN, Case, Ground, Span
+from rftsim.bench.subjects import put
+from rftsim.bench.trials import is_lost
 from rftsim.errors import RftsimError
 from rftsim.law.layout import HEADER, record
 from rftsim.model.readout import instances, work
@@ -21,18 +24,12 @@ try:
 except ModuleNotFoundError:  # which MuJoCo has since 3.17
     Batch = None
 
-Ground = Literal["none", "explicit", "implicit"]
-"""No sand, or sand with a kind of force."""
 Timers = dict[Ground, Callable[[], float]]
 """Functions that each time a step once [s], by ground."""
-GROUNDS: Final[tuple[Ground, ...]] = ("none", "explicit", "implicit")
-"""Every ground; the first is the one that the others are compared with."""
-CASES: Final = (("wheel", "drft2d"), ("wheel", "rft2d"), ("runner", "drft2d"), ("hexapod", "rft3d"))
-"""Subjects and laws that are timed."""
+Times = dict[Ground, list[float]]
+"""Times of a step in every round [s], by ground."""
 LIMITS: Final[dict[Ground, float]] = {"none": math.inf, "explicit": 2.0, "implicit": 3.0}
 """Largest cost that the wheel's step was asked to keep, over the one without sand; batches may lose as much."""
-WINDOW: Final = 0.2
-"""Time that is simulated in each repetition [s]."""
 SIMULATIONS: Final = 256
 """Simulations of a batch."""
 BATCH_STEPS: Final = 40
@@ -52,43 +49,63 @@ class Timed(NamedTuple):
     """The law's name."""
     sand: Ground
     """No sand, or the sand's force."""
+    h: float
+    """Time step [s]."""
     triangles: int
     """Triangles that feel the sand, of all bodies."""
     seconds: float
     """Processor time of a step [s]; the median of the repetitions."""
     ratio: float
     """Time of a step over that without sand; the median of the repetitions' ratios."""
+    over_explicit: float
+    """Time of a step over that with the explicit force; likewise."""
     realtime: float
     """Simulated over processor time."""
     evaluations: float
     """Evaluations of the force in each step, in the mean."""
     derivatives: float
     """Evaluations of its derivative in each step, in the mean."""
+    lost: bool
+    """Whether MuJoCo lost the simulation meanwhile, and timed what it was reset to."""
     batch: dict[int, tuple[float, float]]
-    """Steps per second of all simulations, and their share of those without sand, by the number of threads."""
+    """Steps per second of all simulations, and their share of those without sand, by the number of threads; none where
+    only one simulation is timed."""
 
 
-def measure(rounds: int, report: Callable[[str], Any]) -> list[Timed]:
-    """Time every case; `report` is called with what was done, `repetitions(rounds)` times.
+def choose(names: Iterable[str], quick: bool) -> tuple[list[Case], list[str]]:
+    """The cases of the study, and the robots that are not there.
+
+    Args:
+        names: Names of cases; none for all, or for those of a quick study.
+        quick: Leave out what takes long to load or to step, unless it is named.
+
+    Raises:
+        RftsimError: There is no such case, or its robot is not installed.
+    """
+    found, missing = others.robots()
+    cases, wanted = [*OWN.values(), *others.spheres(), *found], set(names)
+    known = dict.fromkeys(case.name for case in cases)
+    for name in sorted(wanted - set(known)):
+        raise RftsimError(f"no case {name!r}; cases are {', '.join(known)}; not found: {', '.join(missing) or 'none'}")
+    if wanted:
+        return [case for case in cases if case.name in wanted], []
+    return [case for case in cases if case.quick or not quick], [] if quick else missing
+
+
+def measure(cases: list[Case], rounds: int, report: Callable[[str], Any]) -> list[Timed]:
+    """Time cases; `report` is called with what was done, `repetitions(cases, rounds)` times.
 
     Raises:
         RftsimError: This MuJoCo has no batches.
     """
     if Batch is None:
         raise RftsimError(f"this needs mujoco.batch, which mujoco>=3.17 has and {mujoco.__version__} has not")
-    return [timed for name, law in CASES for timed in _case(name, law, rounds, report)]
+    return [timed for case in cases for timed in _time(case, rounds, report)]
 
 
-def repetitions(rounds: int) -> int:
+def repetitions(cases: list[Case], rounds: int) -> int:
     """The number of times that `measure` reports in so many rounds."""
-    return len(CASES) * rounds * (1 + len(THREADS))
-
-
-def models(name: str, law: str) -> dict[Ground, mujoco.MjModel]:
-    """Compile a subject without sand, and with both forces under a law."""
-    subject = SUBJECTS[name]
-    bare: dict[Ground, mujoco.MjModel] = {"none": subject.bare().compile()}
-    return bare | {force: subject.stage(law, force=force).model for force in GROUNDS if force != "none"}
+    return rounds * sum(1 + case.batched * len(THREADS) for case in cases)
 
 
 def randomised(model: mujoco.MjModel, batch: Batch, seed: int) -> None:
@@ -101,25 +118,54 @@ def randomised(model: mujoco.MjModel, batch: Batch, seed: int) -> None:
             beds[field] *= np.exp(rng.uniform(low, high, size=len(numbers)))
 
 
-def _case(name: str, law: str, rounds: int, report: Callable[[str], Any]) -> list[Timed]:
-    """Time a subject under a law on every ground, one simulation at a time and in batches."""
-    moving, found = in_motion(name, law), models(name, law)
+def _time(case: Case, rounds: int, report: Callable[[str], Any]) -> list[Timed]:
+    """Time a case on every ground, one simulation at a time and in batches."""
+    found, begun = case.prepare()
     singles = {ground: mujoco.MjData(model) for ground, model in found.items()}
-    steps = round(WINDOW / moving.model.opt.timestep)
-    timers: Timers = {ground: functools.partial(_single, data, moving, steps) for ground, data in singles.items()}
-    times = _in_turn(timers, rounds, lambda: report(f"{name}, {law}"))
+    steps = round(case.window / found["none"].opt.timestep)
+    timers: Timers = {
+        ground: functools.partial(_single, data, begun[ground], case.move(begun[ground], steps))
+        for ground, data in singles.items()
+    }
+    times = _in_turn(timers, rounds, lambda: report(f"{case.name}, {case.law}"))
     batches = {}
-    for threads in THREADS:
-        timers = {ground: _many(model, moving, threads) for ground, model in found.items()}
-        batches[threads] = _in_turn(timers, rounds, lambda: report(f"{name}, {law}, {SIMULATIONS} at once"))
-    rows = []
-    for ground, model in found.items():
-        seconds = statistics.median(times[ground])
-        shares = {n: (1.0 / statistics.median(own[ground]), 1.0 / _ratio(own, ground)) for n, own in batches.items()}
-        triangles = sum(int(record(one, HEADER).ntri) for bed in instances(model) for one in bed.bodies.values())
-        costs = seconds, _ratio(times, ground), model.opt.timestep / seconds
-        rows.append(Timed(name, law, ground, triangles, *costs, *_work_per_step(singles[ground]), shares))
-    return rows
+    for threads in THREADS if case.batched else ():
+        timers = {
+            ground: _many(model, begun[ground], case.move(begun[ground], BATCH_STEPS), threads)
+            for ground, model in found.items()
+        }
+        batches[threads] = _in_turn(timers, rounds, lambda: report(f"{case.name}, {case.law}, {SIMULATIONS} at once"))
+    return [
+        _timed(case, ground, singles[ground], times, {n: _shares(own, ground) for n, own in batches.items()})
+        for ground in GROUNDS
+    ]
+
+
+def _timed(
+    case: Case, ground: Ground, data: mujoco.MjData, times: Times, batch: dict[int, tuple[float, float]]
+) -> Timed:
+    model, seconds = data.model, statistics.median(times[ground])
+    evaluations, derivatives = _work_per_step(data)
+    return Timed(
+        subject=case.name,
+        law=case.law,
+        sand=ground,
+        h=model.opt.timestep,
+        triangles=sum(int(record(one, HEADER).ntri) for bed in instances(model) for one in bed.bodies.values()),
+        seconds=seconds,
+        ratio=_ratio(times, ground, "none"),
+        over_explicit=_ratio(times, ground, "explicit"),
+        realtime=model.opt.timestep / seconds,
+        evaluations=evaluations,
+        derivatives=derivatives,
+        lost=is_lost(data),
+        batch=batch,
+    )
+
+
+def _shares(times: Times, ground: Ground) -> tuple[float, float]:
+    """Steps per second, and their share of those without sand."""
+    return 1.0 / statistics.median(times[ground]), 1.0 / _ratio(times, ground, "none")
 
 
 def _work_per_step(data: mujoco.MjData) -> tuple[float, float]:
@@ -130,11 +176,11 @@ def _work_per_step(data: mujoco.MjData) -> tuple[float, float]:
     return spent.evaluations / max(spent.steps, 1), spent.derivatives / max(spent.steps, 1)
 
 
-def _in_turn(timers: Timers, rounds: int, report: Callable[[], Any]) -> dict[Ground, list[float]]:
+def _in_turn(timers: Timers, rounds: int, report: Callable[[], Any]) -> Times:
     """Each timer's times in every round; all in turn, so that a busy machine slows all."""
     for once in timers.values():
         once()
-    times: dict[Ground, list[float]] = {ground: [] for ground in timers}
+    times: Times = {ground: [] for ground in timers}
     for _ in range(rounds):
         for ground, once in timers.items():
             times[ground].append(once())
@@ -142,21 +188,25 @@ def _in_turn(timers: Timers, rounds: int, report: Callable[[], Any]) -> dict[Gro
     return times
 
 
-def _ratio(times: dict[Ground, list[float]], ground: Ground) -> float:
-    """Median over the rounds of a ground's time over that without sand."""
-    return statistics.median(own / bare for own, bare in zip(times[ground], times["none"], strict=True))
+def _ratio(times: Times, ground: Ground, other: Ground) -> float:
+    """Median over the rounds of a ground's time over that of another."""
+    return statistics.median(own / base for own, base in zip(times[ground], times[other], strict=True))
 
 
-def _single(data: mujoco.MjData, moving: mujoco.MjData, steps: int) -> float:
+def _single(data: mujoco.MjData, begun: mujoco.MjData, spans: list[Span]) -> float:
     """Processor time of a step of one simulation [s]: elapsed time counts others' turns on a busy machine, too."""
-    put(data, moving)
+    put(data, begun)
     mujoco.mj_forward(data.model, data)
-    started = time.thread_time()
-    mujoco.mj_step(data.model, data, nstep=steps)
-    return (time.thread_time() - started) / steps
+    seconds = 0.0
+    for span in spans:
+        data.ctrl[:] = span.ctrl
+        started = time.thread_time()
+        mujoco.mj_step(data.model, data, nstep=span.steps)
+        seconds += time.thread_time() - started
+    return seconds / sum(span.steps for span in spans)
 
 
-def _many(model: mujoco.MjModel, moving: mujoco.MjData, threads: int) -> Callable[[], float]:
+def _many(model: mujoco.MjModel, begun: mujoco.MjData, spans: list[Span], threads: int) -> Callable[[], float]:
     """Make a timer of a step of one simulation in a batch [s]: elapsed time over the steps of all."""
     batch = Batch(model, SIMULATIONS, threads)
     if model.nnumeric:
@@ -164,11 +214,13 @@ def _many(model: mujoco.MjModel, moving: mujoco.MjData, threads: int) -> Callabl
 
     def once() -> float:
         batch.reset(range(SIMULATIONS), stage=mujoco.mjtStage.mjSTAGE_NONE.value)
-        states: dict[str, Array] = {name: getattr(moving, name) for name in ("qpos", "qvel", "ctrl")}
+        states: dict[str, Array] = {name: getattr(begun, name) for name in ("qpos", "qvel", "ctrl")}
         for name, value in states.items():
             batch.bind(name)[:] = value
         started = time.perf_counter()
-        batch.rollout(BATCH_STEPS)
-        return (time.perf_counter() - started) / (BATCH_STEPS * SIMULATIONS)
+        for span in spans:
+            batch.bind("ctrl")[:] = span.ctrl
+            batch.rollout(span.steps)
+        return (time.perf_counter() - started) / (SIMULATIONS * sum(span.steps for span in spans))
 
     return once

@@ -48,6 +48,7 @@ class Trial:
         data: Its data.
         seconds: Elapsed time of the steps taken [s].
         steps: Number of steps taken.
+        advance: Takes its steps, as `mujoco.mj_step` does.
     """
 
     resting = RESTING
@@ -61,6 +62,7 @@ class Trial:
         self.data = mujoco.MjData(self.model)
         self.seconds = 0.0
         self.steps = 0
+        self.advance: Callable[..., None] = mujoco.mj_step
 
     def run(self, duration: float, before: Callable[[mujoco.MjData], Any] | None = None) -> None:
         """Advance by a duration [s]; `before` is called with the data ahead of each step."""
@@ -75,15 +77,20 @@ class Trial:
 
     def _step(self, count: int) -> None:
         started = time.perf_counter()
-        mujoco.mj_step(self.model, self.data, nstep=count)
+        self.advance(self.model, self.data, nstep=count)
         self.seconds += time.perf_counter() - started
 
     @property
     def failed(self) -> bool:
         """Whether MuJoCo reset the simulation, or would have."""
-        kinds = mujoco.mjtWarning
-        bad = (kinds.mjWARN_BADQPOS, kinds.mjWARN_BADQVEL, kinds.mjWARN_BADQACC)
-        return any(self.data.warning[kind].number for kind in bad)
+        return is_lost(self.data)
+
+
+def is_lost(data: mujoco.MjData) -> bool:
+    """Whether MuJoCo reset a simulation, or would have: a position, velocity or acceleration was not finite or huge."""
+    kinds = mujoco.mjtWarning
+    bad = (kinds.mjWARN_BADQPOS, kinds.mjWARN_BADQVEL, kinds.mjWARN_BADQACC)
+    return any(data.warning[kind].number for kind in bad)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -8,6 +8,7 @@ from typing import Literal
 import tyro
 
 from rftsim.cli.costs import compare_speeds, time_environment, time_kernel
+from rftsim.cli.solver import weigh_solver
 from rftsim.cli.stability import play_hard_cases
 
 
@@ -18,30 +19,38 @@ class Bench:
     stability: the hard cases (rest, light legs, stiff servos, impacts, edges, constraints) at time steps from 0.1 to
     10 ms with the implicit and the explicit force, against the exact or converged answer.
 
-    environment: the time that sand adds to MuJoCo's step, in one simulation and in 256 side by side.
+    environment: the time that sand adds to MuJoCo's step, in one simulation and in 256 side by side: shipped robots,
+    free spheres, and robots of others where they are installed (gymnasium, dm_control, MENAGERIE_ROOT).
 
     pareto: laws, triangles and time steps: what each costs, and how far it is from the finest.
 
     kernel: the time of a buried triangle by the size of the body, over that of the tests' NumPy, and the share of what
     the processor's arithmetic allows.
 
+    solver: the evaluations that the implicit force takes, step by step, and the work that its sand does, in the hard
+    cases, the environments and articulated scenes drawn at random, at time steps from 1 to 10 ms.
+
     Example: rftsim bench stability --plot out
     """
 
-    study: tyro.conf.Positional[Literal["stability", "kernel", "environment", "pareto"]]
+    study: tyro.conf.Positional[Literal["stability", "kernel", "environment", "pareto", "solver"]]
     """The study to run: what is measured, see above."""
     cases: tuple[str, ...] = ()
-    """Names of the hard cases that stability plays; by default all."""
+    """Names of the hard cases that stability and solver play, or of the cases that environment times (wheel, go1); by
+    default all."""
     starts: int = 1000
     """Random starts of a free body on legs, of stability."""
+    scenes: int = 300
+    """Articulated scenes of solver, drawn from the seeds 0, 1, ..."""
     quick: bool = False
-    """Steps of 1 and 5 ms, 20 random starts; bodies of up to 20,480 triangles; fewer repetitions; one law each."""
+    """Fewer time steps, cases, random starts and scenes; bodies of up to 20,480 triangles; fewer repetitions; one law
+    each."""
     oracle: Path = Path("tests/oracle.py")
     """The tests' laws in NumPy, that kernel compares with where they are there."""
     plot: Path | None = None
-    """Folder for the study's picture, NAME.png."""
+    """Folder for the study's picture, NAME.png; solver has none."""
     memory: Path = Path("out/bench")
-    """Folder for what stability and pareto measured: stopped, they go on from there."""
+    """Folder for what stability, pareto and solver measured: stopped, they go on from there."""
     json: bool = False
     """Print JSON instead of the tables."""
 
@@ -50,8 +59,10 @@ class Bench:
         if self.study == "kernel":
             time_kernel(self.quick, self.oracle, self.plot, self.json)
         elif self.study == "environment":
-            time_environment(self.quick, self.plot, self.json)
+            time_environment(self.cases, self.quick, self.plot, self.json)
         elif self.study == "pareto":
             compare_speeds(self.quick, self.memory, self.plot, self.json)
+        elif self.study == "solver":
+            weigh_solver(self.cases, self.scenes, self.quick, self.memory, self.json)
         else:
             play_hard_cases(self.cases, self.starts, self.quick, self.memory, self.plot, self.json)

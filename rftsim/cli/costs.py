@@ -8,6 +8,7 @@ from rich.console import Console
 from rich.table import Table
 
 from rftsim.bench import environment, kernel, pareto
+from rftsim.bench.cases import GROUNDS
 from rftsim.bench.environment import Timed
 from rftsim.bench.environment_picture import plot_environment
 from rftsim.bench.kernel_picture import plot_kernel
@@ -56,24 +57,29 @@ def time_kernel(quick: bool, oracle: Path, plot: Path | None, json: bool) -> Non
     print_written(console, picture)
 
 
-def time_environment(quick: bool, plot: Path | None, json: bool) -> None:
+def time_environment(names: tuple[str, ...], quick: bool, plot: Path | None, json: bool) -> None:
     """Time MuJoCo's step with sand and without: `rftsim bench environment`."""
     picture = picture_in(plot, "environment")
     rounds = 3 if quick else ROUNDS
-    with progress("environment", environment.repetitions(rounds), json) as report:
-        rows = environment.measure(rounds, report)
+    cases, missing = environment.choose(names, quick)
+    with progress("environment", environment.repetitions(cases, rounds), json) as report:
+        rows = environment.measure(cases, rounds, report)
     draw(picture, plot_environment, rows)
     if json:
         print_json([row._asdict() for row in rows])
         return
     console = Console()
     console.print(_single_table(rows))
-    console.print(_batch_table(rows))
+    if any(row.batch for row in rows):
+        console.print(_batch_table([row for row in rows if row.batch]))
     print_line(
         console,
-        f"µs: processor time of a step; x: over that without sand, throughput likewise; real: times real time; work: "
-        f"evaluations and derivatives of the force in a step. Medians of {rounds} repetitions, in turn",
+        f"µs: processor time of a step; x: over that without sand, throughput likewise; expl.: over that with "
+        f"the explicit force; real: times real time; work: evaluations and derivatives of the force in a step. Medians "
+        f"of {rounds} repetitions, in turn",
     )
+    if missing:
+        print_line(console, f"left out, as they are not there: {', '.join(missing)}")
     print_written(console, picture)
 
 
@@ -134,16 +140,19 @@ def _number(value: float) -> float | None:
 
 
 def _single_table(rows: list[Timed]) -> Table:
-    table = make_table("one simulation", ("scene", "sand"), ("triangles", "µs", "x", "real", "work"))
+    table = make_table("one simulation", ("scene", "sand"), ("µs", "x", "expl.", "real", "work"))
     for row in rows:
+        name, sand = _head(row)
+        first = {"none": name, "explicit": f"  {1e3 * row.h:g} ms", "implicit": f"  {row.triangles} triangles"}
         table.add_row(
-            *_head(row),
-            f"{row.triangles}",
-            f"{1e6 * row.seconds:.2f}",
-            f"{row.ratio:.2f}",
-            f"× {row.realtime:.0f}",
-            f"{row.evaluations:.2f} + {row.derivatives:.2f}",
-            end_section=row.sand == environment.GROUNDS[-1],
+            first[row.sand],
+            sand,
+            f"{1e6 * row.seconds:.4g}" if row.seconds < 9e-3 else f"{1e6 * row.seconds:.0f}",
+            "lost" if row.lost else f"{row.ratio:.1f}",
+            f"{row.over_explicit:.1f}" if row.sand == "implicit" else "",
+            f"{row.realtime:.3g}",
+            f"{row.evaluations:.1f} + {row.derivatives:.1f}",
+            end_section=row.sand == GROUNDS[-1],
         )
     return table
 
@@ -154,7 +163,7 @@ def _batch_table(rows: list[Timed]) -> Table:
     table = make_table(title, ("scene", "sand"), headings)
     for row in rows:
         cells = [cell for rate, share in row.batch.values() for cell in (f"{rate:,.0f}/s", f"{share:.2f}")]
-        table.add_row(*_head(row), *cells, end_section=row.sand == environment.GROUNDS[-1])
+        table.add_row(*_head(row), *cells, end_section=row.sand == GROUNDS[-1])
     return table
 
 

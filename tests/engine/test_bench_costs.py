@@ -1,11 +1,15 @@
 """The studies of cost: what they measure is right, whatever the machine's speed."""
 
+import copy
 import math
 
+import mujoco
 import numpy as np
 import pytest
 
-from rftsim.bench import environment, pareto
+import rftsim
+from rftsim.bench import environment, others, pareto
+from rftsim.bench.cases import OWN, draw_controls
 from rftsim.bench.environment_picture import plot_environment
 from rftsim.bench.pareto import Compared, Tried
 from rftsim.bench.pareto_picture import plot_pareto
@@ -40,12 +44,64 @@ def test_a_shorter_step_is_nearer_to_the_reference(runner, tmp_path):
 def test_the_step_with_sand_over_the_one_without(tmp_path):
     """Each evaluation of the force costs time; the batch's simulations have sand of their own and lose no step."""
     pytest.importorskip("mujoco.batch")
-    none, explicit, implicit = environment._case("runner", "drft2d", 3, lambda _: None)
+    none, explicit, implicit = environment._time(OWN["runner", "drft2d"], 3, lambda _: None)
     assert none.ratio == 1.0
     assert 1.0 < explicit.ratio < implicit.ratio
+    assert implicit.over_explicit > 1.0
     assert explicit.evaluations == 1.0
     assert implicit.evaluations >= 1.0
     for one in (explicit, implicit):
         assert all(0.0 < share < 1.0 for _, share in one.batch.values())
-    plot_environment([none, explicit, implicit], tmp_path / "environment.png")
+    alone = [one._replace(subject="alone", batch={}) for one in (none, explicit, implicit)]
+    plot_environment([none, explicit, implicit, *alone], tmp_path / "environment.png")
     assert (tmp_path / "environment.png").stat().st_size > 10_000
+
+
+def test_the_quadruped_trots():
+    """It goes ahead on its feet, its torso above the sand, and nearly every equation is solved."""
+    begun = OWN["quadruped", "rft3d"].prepare().begun["implicit"]
+    data = copy.copy(begun)
+    for span in OWN["quadruped", "rft3d"].move(data, 200):
+        data.ctrl[:] = span.ctrl
+        mujoco.mj_step(data.model, data, nstep=span.steps)
+    assert data.qpos[0] > begun.qpos[0] + 0.1
+    assert data.qpos[2] > 0.2
+    assert rftsim.work(data.model, data).unsolved <= 1
+
+
+def test_spheres_lie_in_the_sand():
+    """Ten spheres stay where they are, apart from each other, at the depth of one."""
+    models, begun = others.spheres()[1].prepare()
+    data = copy.copy(begun["implicit"])
+    mujoco.mj_step(models["implicit"], data, nstep=20)
+    assert np.allclose(data.qpos, begun["implicit"].qpos, atol=1e-5)
+    assert (data.qpos.reshape(10, 7)[:, 2] < 0.05).all()
+    assert data.ncon == 0
+
+
+def test_cases_are_chosen_by_name(monkeypatch, tmp_path):
+    """By name, all, or the quick ones; robots that are not there are said."""
+    monkeypatch.setenv("MENAGERIE_ROOT", str(tmp_path))
+    chosen, missing = environment.choose(["wheel", "spheres-100"], quick=True)
+    assert [(case.name, case.law) for case in chosen] == [
+        ("wheel", "drft2d"),
+        ("wheel", "rft2d"),
+        ("spheres-100", "rft3d"),
+    ]
+    assert missing == []
+    everything, missing = environment.choose([], quick=False)
+    assert {"quadruped", "spheres-400"} <= {case.name for case in everything}
+    assert "go1 (unitree_go1/scene.xml)" in missing
+    with pytest.raises(rftsim.RftsimError, match="no case 'go1'"):
+        environment.choose(["go1"], quick=False)
+
+
+def test_controls_are_the_same_on_every_ground():
+    """They are drawn anew every ten steps, from the range of each, or from -1 to 1 where it has none."""
+    servos = '<actuator><motor joint="a" ctrlrange="0 1"/><motor joint="b"/></actuator>'
+    bodies = "".join(f'<body><joint name="{name}"/><geom size=".1"/></body>' for name in "ab")
+    data = mujoco.MjData(mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{bodies}</worldbody>{servos}</mujoco>"))
+    first, again = draw_controls(data, 25), draw_controls(data, 25)
+    assert [span.steps for span in first] == [10, 10, 5]
+    assert all(np.array_equal(one.ctrl, other.ctrl) for one, other in zip(first, again, strict=True))
+    assert all(0.0 <= span.ctrl[0] <= 0.2 and abs(span.ctrl[1]) <= 0.4 for span in first)

@@ -1,0 +1,162 @@
+"""Cases of the study of the environment: how each is made without sand and with it, how it starts, and is moved."""
+
+import dataclasses
+import math
+from collections.abc import Callable, Mapping
+from typing import Final, Literal, NamedTuple
+
+import mujoco
+import numpy as np
+from rftsim_models import parts
+from rftsim_models.quadruped import DIAGONALS, FEET, JOINTS, LEGS, build_quadruped
+
+from rftsim.bench.subjects import SETTLING, SUBJECTS, in_motion
+from rftsim.model.add_sand import WHOLE, Force, add_sand
+from rftsim.run.scenes import POPPY
+from rftsim.surface.triangles import Array
+
+Ground = Literal["none", "explicit", "implicit"]
+"""No sand, or sand with a kind of force."""
+GROUNDS: Final[tuple[Ground, ...]] = ("none", "explicit", "implicit")
+"""Every ground; the first is the one that the others are compared with."""
+FORCES: Final[tuple[Force, ...]] = ("explicit", "implicit")
+"""Every kind of force."""
+H: Final = 5e-3
+"""Time step of what is not shipped with one [s]."""
+WINDOW: Final = 0.2
+"""Time that is simulated in each repetition, of what moves on as it does [s]."""
+STRIDE: Final = 0.5
+"""Duration of two steps of the quadruped's trot [s]."""
+RENEWED: Final = 4
+"""Time steps after which the quadruped's targets are new."""
+
+
+class Span(NamedTuple):
+    """A number of steps with the same controls."""
+
+    ctrl: Array
+    """The controls, (nu,)."""
+    steps: int
+    """Number of steps."""
+
+
+class Prepared(NamedTuple):
+    """A case that is ready to be timed: its models, and where each begins."""
+
+    models: dict[Ground, mujoco.MjModel]
+    """The compiled models, by ground."""
+    begun: dict[Ground, mujoco.MjData]
+    """Data of a model of the case in motion, or settled, by ground."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Case:
+    """A robot or bodies whose step is timed on every ground.
+
+    Attributes:
+        name: Its name.
+        law: The law of its sand.
+        prepare: Makes its models and takes them to where the timing begins.
+        move: Makes the controls of some steps from the data at their start.
+        window: Time that is simulated in each repetition [s].
+        batched: Whether many simulations are timed, too.
+        quick: Whether it is among the cases of a quick study.
+    """
+
+    name: str
+    law: str
+    prepare: Callable[[], Prepared]
+    move: Callable[[mujoco.MjData, int], list[Span]]
+    window: float = WINDOW
+    batched: bool = True
+    quick: bool = True
+
+
+def hold(data: mujoco.MjData, steps: int) -> list[Span]:
+    """The controls that the data have, for some steps."""
+    return [Span(data.ctrl.copy(), steps)]
+
+
+def settle(model: mujoco.MjModel, duration: float = SETTLING) -> mujoco.MjData:
+    """Make data of a model that was left alone for a duration [s], from its keyframe where it has one."""
+    data = mujoco.MjData(model)
+    if model.nkey:
+        mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_step(model, data, nstep=round(duration / model.opt.timestep))
+    return data
+
+
+def _of_subject(name: str, law: str, *, quick: bool = True) -> Case:
+    def prepare() -> Prepared:
+        subject = SUBJECTS[name]
+        models: dict[Ground, mujoco.MjModel] = {"none": subject.bare().compile()}
+        models |= {force: subject.stage(law, force=force).model for force in FORCES}
+        return Prepared(models, dict.fromkeys(GROUNDS, in_motion(name, law)))
+
+    return Case(name, law, prepare, hold, quick=quick)
+
+
+def _build_quadruped() -> mujoco.MjSpec:
+    spec = build_quadruped()
+    spec.option.timestep = H
+    return spec
+
+
+def _prepare_quadruped() -> Prepared:
+    models: dict[Ground, mujoco.MjModel] = {"none": _build_quadruped().compile()}
+    for force in FORCES:
+        spec, options = _build_quadruped(), {**WHOLE, "max_edge": math.inf, "bodies": (parts.TORSO, *FEET)}
+        add_sand(spec, POPPY, "rft3d", force=force, draw=False, **options)
+        models[force] = spec.compile()
+    data = settle(models["implicit"])
+    for span in _trot(data, round(SETTLING / H)):
+        data.ctrl[:] = span.ctrl
+        mujoco.mj_step(data.model, data, nstep=span.steps)
+    return Prepared(models, dict.fromkeys(GROUNDS, data))
+
+
+def _trot(data: mujoco.MjData, steps: int) -> list[Span]:
+    """Controls of the quadruped's trot: diagonal legs lift their feet and swing ahead together."""
+    key, spans = data.model.key_ctrl[0], []
+    for k in range(0, steps, RENEWED):
+        ctrl = key.copy()
+        for pair, legs in enumerate(DIAGONALS):
+            phase = 2.0 * math.pi * (data.time + k * H) / STRIDE + math.pi * pair
+            lift, swing = max(math.sin(phase), 0.0), math.cos(phase)
+            for leg in legs:
+                ctrl[JOINTS.index(f"hip_{LEGS[leg]}")] += 0.15 * swing + 0.3 * lift
+                ctrl[JOINTS.index(f"knee_{LEGS[leg]}")] -= 0.6 * lift
+        spans.append(Span(ctrl, min(RENEWED, steps - k)))
+    return spans
+
+
+OWN: Final[Mapping[tuple[str, str], Case]] = {
+    (case.name, case.law): case
+    for case in (
+        _of_subject("wheel", "drft2d"),
+        _of_subject("wheel", "rft2d", quick=False),
+        _of_subject("runner", "drft2d", quick=False),
+        _of_subject("hexapod", "rft3d"),
+        Case("quadruped", "rft3d", _prepare_quadruped, _trot),
+    )
+}
+"""The cases with shipped models, by name and law."""
+
+
+def draw_controls(data: mujoco.MjData, steps: int, *, every: int = 10, share: float = 0.2, seed: int = 0) -> list[Span]:
+    """Controls around those of the data, drawn anew after some steps.
+
+    Args:
+        data: The data at the start.
+        steps: Number of steps.
+        every: Number of steps between two draws.
+        share: Largest change, over the control's range.
+        seed: The seed, the same on every ground.
+    """
+    model, random = data.model, np.random.default_rng(seed)
+    low, high = np.where(model.actuator_ctrllimited[:, None].astype(bool), model.actuator_ctrlrange, [-1.0, 1.0]).T
+    spans = []
+    for k in range(0, steps, every):
+        drawn = data.ctrl + share * (high - low) * random.uniform(-1.0, 1.0, model.nu)
+        spans.append(Span(np.clip(drawn, low, high), min(every, steps - k)))
+    return spans

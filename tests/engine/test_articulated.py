@@ -1,0 +1,125 @@
+"""Articulated scenes drawn from a seed: the same seed gives the same scene, and sand loses none that stands without."""
+
+import mujoco
+import numpy as np
+import pytest
+
+import rftsim
+from rftsim.bench import solver
+from rftsim.bench.articulated import articulated
+from rftsim.bench.effort import Effort, Meter
+from rftsim.bench.trials import is_lost
+
+H = 5e-3
+SEEDS = range(12)
+
+
+def same(one, other):
+    """Whether two compiled models are equal in all that is drawn."""
+    names = (
+        "body_pos",
+        "body_mass",
+        "geom_size",
+        "jnt_axis",
+        "dof_damping",
+        "actuator_gainprm",
+        "eq_data",
+        "numeric_data",
+    )
+    return all(np.array_equal(getattr(one, name), getattr(other, name)) for name in names)
+
+
+def test_a_seed_is_a_scene():
+    """Drawn twice it is the same, with sand and without; another seed gives another one."""
+    first = articulated(3)
+    articulated.cache_clear()
+    again = articulated(3)
+    assert same(first.bare(H), again.bare(H))
+    assert same(first.sandy(H), again.sandy(H))
+    assert np.array_equal(first.velocity, again.velocity)
+    assert first.sand == again.sand
+    assert first.bare(H).nbody != articulated(4).bare(H).nbody
+
+
+def test_scenes_differ():
+    """A hundred seeds have every kind of joint and geom, loops, tendons, both laws and slopes."""
+    scenes = [articulated(seed) for seed in range(100)]
+    models = [scene.spec.copy().compile() for scene in scenes]
+    assert {kind for model in models for kind in model.jnt_type.tolist()} == set(range(4))
+    assert {kind for model in models for kind in model.geom_type.tolist()} >= {2, 3, 4, 5, 6}
+    assert {scene.law for scene in scenes} == {"rft3d", "drft3d"}
+    assert {model.opt.integrator for model in models} == {0, 2, 3}
+    for name in ("neq", "ntendon", "nu"):
+        assert 0 < sum(getattr(model, name) > 0 for model in models) < 100
+    assert any(scene.terrain.normal[2] < 1.0 for scene in scenes)
+    assert min(model.body_mass[1:].min() for model in models) >= 0.01
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_sand_loses_no_scene(seed):
+    """What MuJoCo steps without sand it steps with it, and nothing is left that is no number."""
+    scene = articulated(seed)
+    model = scene.sandy(H)
+    data = scene.start(model)
+    for _ in range(round(1.0 / H)):
+        scene.move(data)
+        mujoco.mj_step(model, data)
+    assert scene.lost(H, 1.0) or not is_lost(data)
+    assert np.isfinite(data.qpos).all()
+    assert np.isfinite(rftsim.wrenches(model, data).force).all()
+
+
+def test_the_meter_counts_what_work_counts():
+    """Step by step, the meter adds up to the totals; its sand has done work against the motion."""
+    scene, meter = articulated(3), Meter()
+    model = scene.sandy(H)
+    data = scene.start(model)
+    meter.advance(model, data, nstep=40)
+    effort, spent = meter.effort(), rftsim.work(model, data)
+    assert (effort.steps, effort.evaluations, effort.derivatives) == (40, spent.evaluations, spent.derivatives)
+    assert effort.evaluations / 40 <= effort.worst <= effort.evaluations
+    assert effort.gain < 1e-3
+    assert not effort.lost
+
+
+def test_the_meter_stops_where_a_simulation_is_lost():
+    """A velocity that is no number ends it; the step is not counted."""
+    scene, meter = articulated(3), Meter()
+    model = scene.sandy(H)
+    data = scene.start(model)
+    meter.advance(model, data, nstep=3)
+    data.qvel[0] = np.nan
+    meter.advance(model, data, nstep=3)
+    assert (meter.effort().steps, meter.effort().lost) == (3, True)
+
+
+def test_the_study_is_remembered(tmp_path):
+    """A second run measures nothing; the worst are listed once each; what is lost bare does not count as lost."""
+    names, calls = ("a", "b"), []
+
+    def measure(name, h):
+        calls.append(name)
+        return Effort(10, 20, 5, 7 if name == "a" else 9, 1, 0.1, 0.2, name == "b", name == "b")
+
+    for _ in range(2):
+        played = solver.Study(tmp_path / "solver.json").play(
+            solver.Group("made up", names, measure), (1e-3, 5e-3), lambda _: None
+        )
+    assert len(calls) == 4
+    first, second = solver.summarise(played)
+    assert (first.h, second.h, first.evaluations, first.worst, first.unsolved) == (1e-3, 5e-3, 2.0, 9, 0.1)
+    assert (first.lost, first.lost_bare) == (0, 1)
+    assert solver.lost(played) == []
+    assert [one.member for one in solver.hardest(played, lambda effort: effort.worst)] == ["b", "a"]
+
+
+@pytest.mark.slow
+def test_random_scenes_are_cheap():
+    """Of 300 scenes, sand loses none, and no step of any takes long."""
+    group = solver.scenes(solver.SCENES)
+    played = [solver.Played(group.name, seed, H, group.measure(seed, H)) for seed in group.members]
+    (summary,) = solver.summarise(played)
+    assert [one.member for one in solver.lost(played)] == []
+    assert summary.worst <= 60, solver.hardest(played, lambda effort: effort.worst)
+    assert summary.evaluations <= 3.0
+    assert summary.unsolved <= 1e-4
