@@ -117,7 +117,7 @@ def _correct(p):
 @exact
 def _filter(p, impulse, out):
     """Fill out with A^-1 M A^-1 impulse, A the matrix that the linearised equation left factored."""
-    factors, between = equation.linear_factors(p), equation.solved(p)
-    sparse.substitute(p, factors, impulse, out)
+    between = equation.solved(p)
+    linearised.substitute(p, impulse, out)
     sparse.multiply(p, equation.mass(p), out, between)
-    sparse.substitute(p, factors, between, out)
+    linearised.substitute(p, between, out)

@@ -42,20 +42,11 @@ def _seen(p, change):
 
 
 @exact
-def changes(p, change, out):
-    """Fill out with J a at a velocity change, (nrow,)."""
-    seen, inverse = _seen(p, change), 1.0 / equation.numbers(p).h
-    for i in range(out.size):
-        out[i] = inverse * product(p, i, seen)
-
-
-@exact
 def accelerations(p, change, out):
     """Fill out with J a - aref at a velocity change v+ - v, (nrow,)."""
-    changes(p, change, out)
-    reference = equation.row_reference(p)
+    seen, inverse, reference = _seen(p, change), 1.0 / equation.numbers(p).h, equation.row_reference(p)
     for i in range(out.size):
-        out[i] -= reference[i]
+        out[i] = inverse * product(p, i, seen) - reference[i]
 
 
 @exact
@@ -155,18 +146,13 @@ def note_zones(p, x):
 
 @exact
 def _add_product(p, r, k, share, a):
-    """Add a share of the product of rows r and k, as the solver sees the latter, to a matrix.
-
-    M^-1 M_h is taken for diagonal here, 1 + h drag / mass: it is not in the residual.
-    """
+    """Add a share of the product of rows r and k to a matrix."""
     rows, columns, left, right = equation.row_path(p, r), equation.row_path(p, k), equation.row_jacobian(p, r), 0.0
-    j, light, drag, h = equation.row_jacobian(p, k), equation.lightness(p), equation.drag(p), equation.numbers(p).h
-    is_dragged = equation.numbers(p).dragged > 0.0
+    j = equation.row_jacobian(p, k)
     for m in range(equation.row_length(p)[k]):
-        column = columns[m]
-        right = share * j[m] * ((1.0 + h * drag[column, column] * light[column]) if is_dragged else 1.0)
+        right = share * j[m]
         for i in range(equation.row_length(p)[r]):
-            a[rows[i], column] += left[i] * right
+            a[rows[i], columns[m]] += left[i] * right
 
 
 @exact
@@ -193,7 +179,7 @@ def _add_sliding(p, x, first, last, normal, tangential, a):
 
 @exact
 def add_stiffness(p, x, force, a):
-    """Add J' H J M^-1 M_h to a matrix (ndof, ndof), H the derivative of the rows' forces at x, sign reversed."""
+    """Add J' H J to a matrix (ndof, ndof), H the derivative of the rows' forces at x, sign reversed."""
     kind, stiffness, bound = equation.row_kind(p), equation.row_stiffness(p), equation.row_bound(p)
     i = np.int64(0)  # no constant, for which numba would compile what takes it anew
     while i < kind.size:

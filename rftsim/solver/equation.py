@@ -138,11 +138,9 @@ row_error = _T.vector("nrow")
 row_force = _T.vector("nrow")
 """Scratch: the rows' forces, (nrow,)."""
 row_moved = _T.vector("nrow")
-"""Scratch: change of J a along a direction, (nrow,)."""
+"""Scratch: J of a direction, (nrow,)."""
 row_tried = _T.vector("nrow")
 """Scratch: J a - aref on the way along a direction, (nrow,)."""
-row_share = _T.vector("nrow")
-"""Scratch: size of J along a direction, (nrow,)."""
 
 # The equation. Its matrices have the pattern of `coupled`; what lies outside of that is never read.
 coupled = _T.vectors("ndof", "ndof", view=int64s)
@@ -191,7 +189,11 @@ solved = _T.vector("ndof")
 sand_force = _T.vector("ndof")
 """Scratch: the sand's generalised force, (ndof,)."""
 direction = _T.vector("ndof")
-"""Scratch: the direction of a step of the linearised equation, (ndof,)."""
+"""Scratch: the direction of a step of the linearised equation, as the rows see it, (ndof,)."""
+taken = _T.vector("ndof")
+"""Scratch: the velocity change by that, (ndof,)."""
+late_share = _T.vector("ndof")
+"""Scratch: about the diagonal of M_h^-1 M, (ndof,)."""
 missing = _T.vector("ndof")
 """Scratch: the impulse missing in the linearised equation, (ndof,)."""
 fixed = _T.vector("ndof")

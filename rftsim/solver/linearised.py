@@ -50,13 +50,41 @@ def _linearise(p, which):
 
 
 @exact
-def _factor_with_rows(p, x, force):
-    """Factor `equation.linear` with the rows' stiffness at x."""
-    a = equation.linear_factors(p)
-    sparse.copy(p, equation.linear(p), a)
-    if equation.head(p).nrow > 0:
+def _factor(p, x, force):
+    """Factor the matrix of the linearised equation, with the rows' stiffness at x.
+
+    Where there are rows and drag, it is that for the velocity change that the rows see, M^-1 M_h (v+ - v); the sand's
+    share is then approximate, by a diagonal of what leads back from that.
+    """
+    a, linear = equation.linear_factors(p), equation.linear(p)
+    if equation.head(p).nrow == 0:
+        sparse.copy(p, linear, a)
+    else:
+        sparse.copy(p, equation.plain_mass(p), a)
+        share, h = equation.late_share(p), equation.numbers(p).h
+        for k in range(share.size):
+            share[k] = 1.0 / (1.0 + h * max(equation.drag(p)[k, k], 0.0) * equation.lightness(p)[k])
+        sparse.add_difference(p, linear, equation.mass(p), share, a)
         constraint_rows.add_stiffness(p, x, force, a)
     sparse.factor(p, a)
+
+
+@exact
+def substitute(p, impulse, out):
+    """Fill out with the velocity change by an impulse, by the matrix that was factored last."""
+    if not is_indirect(p):
+        sparse.substitute(p, equation.linear_factors(p), impulse, out)
+        return
+    seen, slowed = equation.seen(p), equation.slowed(p)
+    sparse.substitute(p, equation.linear_factors(p), impulse, seen)
+    sparse.multiply(p, equation.plain_mass(p), seen, slowed)
+    sparse.substitute(p, equation.mass_factors(p), slowed, out)
+
+
+@exact
+def is_indirect(p):
+    """Whether the rows see another velocity change than the equation's."""
+    return equation.head(p).nrow > 0 and equation.numbers(p).dragged > 0.0
 
 
 @exact
@@ -67,7 +95,7 @@ def solution(p, v, residual, which, out):
         _solve_with_rows(p, v, residual, which, out)
         return
     direction, nothing = equation.direction(p), equation.missing(p)
-    _factor_with_rows(p, nothing, nothing)
+    _factor(p, nothing, nothing)
     sparse.substitute(p, equation.linear_factors(p), residual, direction)
     for k in range(v.size):
         out[k] = v[k] - direction[k]
@@ -95,26 +123,24 @@ def _solve_with_rows(p, v, residual, which, out):
     h = equation.numbers(p).h
     x, force, moved = equation.row_error(p), equation.row_force(p), equation.row_moved(p)
     change, fixed, missing = equation.change(p), equation.fixed(p), equation.missing(p)
-    direction = equation.direction(p)
-    first = True
+    direction, taken, first = equation.direction(p), equation.taken(p), True
     target = EXACTNESS[which] * (linear_algebra.dot(residual, residual) + TINY)
     for _ in range(ITERATIONS):
         if constraint_rows.note_zones(p, x) or first:
-            _factor_with_rows(p, x, force)
+            _factor(p, x, force)
         first = False
-        sparse.substitute(p, equation.linear_factors(p), missing, direction)
-        for k in range(v.size):
-            direction[k] = -direction[k]
-        sparse.multiply(p, equation.linear(p), direction, change)
+        _fill_direction(p)
+        sparse.multiply(p, equation.linear(p), taken, change)
         stiff, slope = linear_algebra.dot(direction, change), linear_algebra.dot(direction, fixed)
-        constraint_rows.changes(p, direction, moved)
+        for i in range(moved.size):
+            moved[i] = constraint_rows.product(p, i, direction)
         t = _crossing(p, slope, stiff)
         for k in range(v.size):
-            out[k] += t * direction[k]
+            out[k] += t * taken[k]
             fixed[k] += t * change[k]
             missing[k] = fixed[k]
         for i in range(x.size):
-            x[i] += t * moved[i]
+            x[i] += t * moved[i] / h
         constraint_rows.forces(p, x, force)
         constraint_rows.add_forces(p, force, -h, missing)
         if linear_algebra.dot(missing, missing) <= target:
@@ -122,22 +148,33 @@ def _solve_with_rows(p, v, residual, which, out):
 
 
 @exact
+def _fill_direction(p):
+    """Fill `direction`, as the rows see it, with a step that makes up for the missing impulse; and `taken` by it."""
+    direction, taken, slowed = equation.direction(p), equation.taken(p), equation.slowed(p)
+    sparse.substitute(p, equation.linear_factors(p), equation.missing(p), direction)
+    for k in range(direction.size):
+        direction[k] = -direction[k]
+    if is_indirect(p):
+        sparse.multiply(p, equation.plain_mass(p), direction, slowed)
+        sparse.substitute(p, equation.mass_factors(p), slowed, taken)
+    else:
+        linear_algebra.copy(direction, taken)
+
+
+@exact
 def _along(p, slope, stiff, t):
     """Missing impulse along `equation.direction` after a share t of it; slope and stiff are what is not the rows'."""
     x, moved, tried, force = equation.row_error(p), equation.row_moved(p), equation.row_tried(p), equation.row_force(p)
-    h, share = equation.numbers(p).h, equation.row_share(p)
+    h, inverse = equation.numbers(p).h, 1.0 / equation.numbers(p).h
     for i in range(x.size):
-        tried[i] = x[i] + t * moved[i]
+        tried[i] = x[i] + t * inverse * moved[i]
     constraint_rows.forces(p, tried, force)
-    return slope + t * stiff - h * linear_algebra.dot(force, share)
+    return slope + t * stiff - h * linear_algebra.dot(force, moved)
 
 
 @exact
 def _crossing(p, slope, stiff):
     """The share t of `equation.direction`, at most one, after which the missing impulse along it vanishes."""
-    share, direction = equation.row_share(p), equation.direction(p)
-    for i in range(share.size):
-        share[i] = constraint_rows.product(p, i, direction)
     low, at_low = 0.0, _along(p, slope, stiff, 0.0)
     high, at_high = 1.0, _along(p, slope, stiff, 1.0)
     if at_high <= 1e-6 * abs(at_low) or at_low >= 0.0:

@@ -78,6 +78,18 @@ def add(p, a, share, out):
             out[own[i], k] += share * a[own[i], k]
 
 
+@exact
+def add_difference(p, a, b, share, out):
+    """Add A - B, each column by its own share, to the matrix out."""
+    for k in range(a.shape[0]):
+        own = equation.coupled(p, k)
+        out[k, k] += share[k] * (a[k, k] - b[k, k])
+        for i in range(equation.coupled_length(p)[k]):
+            other = own[i]
+            out[k, other] += share[other] * (a[k, other] - b[k, other])
+            out[other, k] += share[k] * (a[other, k] - b[other, k])
+
+
 @inline
 def _numbers(a):
     """All entries of a matrix, one after another, to be read and written by `peek` and `poke`."""
