@@ -35,7 +35,7 @@ tolerance and most iterations of the implicit force, whether the law is dynamic 
 unknown), and the coefficients of f1, f2 and f3."""
 TOLERANCE: Final = 3e-3
 """Error of a body's velocity, relative, to which the implicit force is solved for unless the user says otherwise."""
-ITERATIONS: Final = 20
+ITERATIONS: Final = 40
 """Most iterations of one solution, unless the user says otherwise."""
 
 Medium = namedtuple("Medium", [name for name, *_ in _MEDIUM])  # type: ignore[misc]

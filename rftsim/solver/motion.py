@@ -61,26 +61,28 @@ def generalised(p, k, later, out):
 
 
 @exact
+def respond(p, b, twist, out):
+    """Fill out with the wrenches on body b that moves with a twist, at the present depths and the later ones, (12,)."""
+    sand, numbers, f, r = equation.head(p).sand, equation.numbers(p), equation.frame(p, b), equation.rotation(p, b)
+    fixed = equation.surface(p)[b], f.ctypes.data, r.ctypes.data
+    exports.ahead(sand, *fixed, twist.ctypes.data, numbers.v_c, numbers.h, out.ctypes.data)
+
+
+@exact
 def evaluate(p, v, k):
     """Evaluate the wrenches at a velocity into point k."""
-    h, v_c = equation.numbers(p).h, equation.numbers(p).v_c
     twist = doubles(stack_doubles(6), 6)
-    sand = equation.head(p).sand
     for b in range(equation.head(p).nbody):
         twist_of(p, b, v, twist)
-        f, r = equation.frame(p, b).ctypes.data, equation.rotation(p, b).ctypes.data
-        out = equation.wrench_of(p, k, b, 0).ctypes.data
-        exports.ahead(sand, equation.surface(p)[b], f, r, twist.ctypes.data, v_c, h, out)
+        respond(p, b, twist, equation.wrench_of(p, k, b, 0))
     equation.work(p).evaluations += 1.0
 
 
 @exact
-def differentiate(p, b, v, completed):
+def differentiate(p, b, twist, completed):
     """Evaluate the derivative of body b's wrench by its twist: the exact one (0.0), or the completed one (1.0)."""
-    twist = doubles(stack_doubles(6), 6)
-    sand, v_c = equation.head(p).sand, equation.numbers(p).v_c
-    twist_of(p, b, v, twist)
-    f, r = equation.frame(p, b).ctypes.data, equation.rotation(p, b).ctypes.data
-    g = equation.completed(p, b) if completed > 0.0 else equation.derivative(p, b)
-    exports.derivative(sand, equation.surface(p)[b], f, r, twist.ctypes.data, v_c, completed, g.ctypes.data)
+    sand, numbers, f, r = equation.head(p).sand, equation.numbers(p), equation.frame(p, b), equation.rotation(p, b)
+    fixed = equation.surface(p)[b], f.ctypes.data, r.ctypes.data
+    g = equation.derivative(p, b).ctypes.data
+    exports.derivative(sand, *fixed, twist.ctypes.data, numbers.v_c, completed, g)
     equation.work(p).derivatives += 1.0 / equation.head(p).nbody
