@@ -32,14 +32,23 @@ NUMBERS: Final = np.dtype(
 )
 """MuJoCo's time step [s]; that of the equation [s]; whether a step was made before; whether the integrator takes drag
 implicitly; tolerance and most iterations; size of the impulses but the sand's and the rows'; speed below which a
-triangle's stress falls to zero [m/s]; whether the equation was solved; length of
-the last part of a split step [s]; parts that are needed."""
+triangle's stress falls to zero [m/s]; whether the equation was solved; length of the last part of a split step [s];
+parts that are needed."""
 SCORES: Final = np.dtype([("missing", "f8"), ("scale", "f8"), ("error", "f8")])
 """Scores of a tried velocity: size of the missing impulse, size of all impulses, and error of the bodies' speeds over
 what is allowed, were there no stiffness."""
-PROGRESS: Final = np.dtype([(name, "f8") for name in ("is_stale", "failures", "iteration", "loosened", "contraction")])
-"""State of a solution under way: whether derivatives should be taken anew; how often a step led nowhere; iterations;
-factor on the tolerance; share of the missing impulse that a step leaves."""
+PROGRESS: Final = np.dtype(
+    [
+        (name, "f8")
+        for name in (
+            *("is_stale", "by_secant", "secants_left", "shortened", "failures"),
+            *("iteration", "loosened", "share", "contraction"),
+        )
+    ]
+)
+"""State of a solution under way: whether derivatives should be taken anew; whether the direction comes from the
+completed ones, and for how many more steps; how often the direction was shortened, and failed; iterations; factor on
+the tolerance; share of the direction that is tried; share of the missing impulse that a step leaves."""
 
 
 class Kinds(NamedTuple):
@@ -154,6 +163,8 @@ force = _T.vector("ndof")
 # Its solution.
 progress = _T.record(PROGRESS)
 """Record PROGRESS of the solution."""
+completed, _ = _T.each("nbody", 6, 6)
+"""Derivative of a body's wrench by its twist that does not overshoot, (6, 6)."""
 velocity_of = _T.vectors("ndof", _POINTS)
 """Generalised velocity of a point, (ndof,)."""
 residual_of = _T.vectors("ndof", _POINTS)
@@ -190,9 +201,9 @@ fixed = _T.vector("ndof")
 search = _T.vector("ndof")
 """Scratch: the direction of a step of the solution, (ndof,)."""
 there = _T.vector("ndof")
-"""Scratch: a velocity on the way, (ndof,)."""
+"""Scratch: a velocity beside a body's rest, (ndof,)."""
 others = _T.vector("ndof")
-"""Scratch: the sand's generalised force at the best point, (ndof,)."""
+"""Scratch: the sand's generalised force on all bodies but one, (ndof,)."""
 mean = _T.vector("ndof")
 """Scratch: the mean velocity of a step, (ndof,)."""
 difference = _T.vector("ndof")

@@ -9,11 +9,19 @@ from rftsim.solver import constraint_rows, equation, linear_algebra, sparse
 
 NONE: Final = 0
 EXACT: Final = 1
-"""Whether the linearised equation takes the derivatives of the sand's force."""
+COMPLETED: Final = 2
+"""Which derivative of the sand's force the linearised equation takes."""
 ITERATIONS: Final = 20
 """Steps of Newton's method on the rows, and trials of one step's length, at most."""
-EXACTNESS: Final = (1e-16, 1e-6)
-"""Square of the share of the missing impulse that may be left, by whether it does."""
+EXACTNESS: Final = (1e-16, 1e-6, 1e-6)
+"""Square of the share of the missing impulse that may be left, by which derivative is taken."""
+
+
+@exact
+def _derivative(p, which, b):
+    if which == COMPLETED:
+        return equation.completed(p, b)
+    return equation.derivative(p, b)
 
 
 @exact
@@ -37,8 +45,8 @@ def _linearise(p, which):
     if which == NONE:
         return
     for b in range(equation.head(p).nbody):
-        if equation.kept(p, b).known > 0.0:
-            _add_derivative(p, b, equation.derivative(p, b), a)
+        if which == COMPLETED or equation.kept(p, b).known > 0.0:
+            _add_derivative(p, b, _derivative(p, which, b), a)
 
 
 @exact

@@ -83,6 +83,6 @@ def differentiate(p, b, twist, completed):
     """Evaluate the derivative of body b's wrench by its twist: the exact one (0.0), or the completed one (1.0)."""
     sand, numbers, f, r = equation.head(p).sand, equation.numbers(p), equation.frame(p, b), equation.rotation(p, b)
     fixed = equation.surface(p)[b], f.ctypes.data, r.ctypes.data
-    g = equation.derivative(p, b).ctypes.data
+    g = equation.completed(p, b).ctypes.data if completed > 0.0 else equation.derivative(p, b).ctypes.data
     exports.derivative(sand, *fixed, twist.ctypes.data, numbers.v_c, completed, g)
     equation.work(p).derivatives += 1.0 / equation.head(p).nbody

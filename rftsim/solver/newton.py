@@ -15,6 +15,7 @@ Where a step passes rest or the edge of a face, the next trial is at rest, or by
 
 from typing import Final
 
+import numpy as np
 from numba import types
 
 from rftsim.machine.compiling import exact
@@ -23,7 +24,7 @@ from rftsim.machine.memory import doubles, stack_doubles
 from rftsim.solver import equation, linear_algebra, linearised, residual
 from rftsim.solver.centring import centre
 from rftsim.solver.equation import POINT
-from rftsim.solver.motion import add_wrench, differentiate, respond, size_of, speed_of, twist_of
+from rftsim.solver.motion import add_wrench, differentiate, generalised, respond, size_of, speed_of, twist_of
 from rftsim.solver.residual import allowed, attempt, copy_point
 
 V_C: Final = 3e-7
@@ -48,16 +49,22 @@ DERIVATIVE: Final = 2.0
 """Evaluations that a derivative is worth."""
 RESERVE: Final = 4.0
 """Evaluations' worth that is left unspent by one solution, for what follows it."""
-POOR: Final = 0.2
-"""Share of the largest misfit from which on a body's derivative is taken anew."""
-STAGES: Final = 4
-"""Stages of an easing; twice as many in each further one."""
+NEAR: Final = 0.25
+"""Square of the share of a body's speed that is left where a step is said to pass its rest."""
+BESIDE: Final = 0.3
+"""Speed, over v_c, at which a body is tried beside its rest."""
+EASED: Final = 2.0
+"""The failure after which a solution of several bodies is eased; that of a single one is at the first."""
+STAGES: Final = 5
+"""Stages of that, after the first."""
 SLIDES: Final = 4.0
 """Speed over v_c from which on a body slides on, whatever v_c is."""
 HELD: Final = 30.0
 """Speed over v_c below which a body is held by the sand, or nearly."""
 HELD_FORCE: Final = 0.1
 """Missing impulse that is allowed where one is, over all impulses and the tolerance."""
+POOR: Final = 0.2
+"""Share of the largest misfit from which on a body's derivative is taken anew."""
 
 
 @entry(types.void, address)
@@ -67,21 +74,18 @@ def solve(p):
     progress, best = equation.progress(p), equation.scores(p, POINT.best)
     accepted = False
     while not accepted:
-        _choose_direction(p)
-        accepted = _is_short(p)
+        if progress.shortened == 0.0:
+            _choose_direction(p)
+            accepted = _is_short(p)
         if accepted or _is_given_up(p):
             break
         progress.iteration += 1.0
         if progress.iteration > PATIENCE:
             progress.loosened = min(1.5 * progress.loosened, LOOSEST)
-        _try_along(p, equation.search(p), POINT.new)
+        _try_along(p, equation.search(p), progress.share, POINT.new)
         _keep_best(p, POINT.new)
-        if not _leads_nowhere(p):
+        if not _is_refused(p):
             _accept(p)
-        elif not _all_fresh(p):
-            progress.is_stale = 1.0
-        else:
-            _ease(p)
     if accepted:
         copy_point(p, POINT.now, POINT.best)
     near = best.error <= LOOSEST or best.missing <= 1e-2 * best.scale
@@ -115,8 +119,8 @@ def _begin(p):
         numbers.v_c = max(numbers.v_c, CREEP * speed_of(p, b, equation.start(p)))
         equation.is_fresh(p)[b], equation.misfit(p)[b] = 0.0, 0.0
         known = known and equation.kept(p, b).known > 0.0
-    progress.failures = progress.iteration = 0.0
-    progress.loosened = 1.0
+    progress.by_secant = progress.secants_left = progress.shortened = progress.failures = progress.iteration = 0.0
+    progress.loosened = progress.share = 1.0
     progress.contraction = KEPT_LEAVES
     _predict(p)
     attempt(p, POINT.now)
@@ -155,13 +159,23 @@ def _predict(p):
 
 @exact
 def _choose_direction(p):
-    """Fill `search` with the step to the solution of the linearised equation."""
-    v, direction = equation.velocity_of(p, POINT.now), equation.search(p)
-    if equation.progress(p).is_stale > 0.0:
+    """Fill `search` with the step to the solution of the linearised equation, by the derivative that is its turn."""
+    progress, v = equation.progress(p), equation.velocity_of(p, POINT.now)
+    progress.by_secant = 1.0 if progress.secants_left > 0.0 else 0.0
+    if progress.by_secant > 0.0:
+        twist = doubles(stack_doubles(6), 6)
+        for b in range(equation.head(p).nbody):
+            twist_of(p, b, v, twist)
+            differentiate(p, b, twist, 1.0)
+        progress.secants_left -= 1.0
+    elif progress.is_stale > 0.0:
         _refresh(p)
-    linearised.solution(p, v, equation.residual_of(p, POINT.now), linearised.EXACT, direction)
+    which = linearised.COMPLETED if progress.by_secant > 0.0 else linearised.EXACT
+    direction = equation.search(p)
+    linearised.solution(p, v, equation.residual_of(p, POINT.now), which, direction)
     for k in range(v.size):
         direction[k] -= v[k]
+    progress.share = 1.0
 
 
 @exact
@@ -184,14 +198,16 @@ def _refresh(p):
 @exact
 def _is_short(p):
     """Whether the direction at hand is so short that it leads to the solution, as near as is asked for."""
-    numbers, now, direction = equation.numbers(p), equation.scores(p, POINT.now), equation.search(p)
+    numbers, progress, now = equation.numbers(p), equation.progress(p), equation.scores(p, POINT.now)
+    if progress.by_secant > 0.0:
+        return False
     if now.error <= 1.0:
         return True
-    left, there, force = equation.progress(p).contraction, equation.there(p), FORCE
+    left, there, force = progress.contraction, equation.there(p), FORCE
     for k in range(there.size):
-        there[k] = equation.velocity_of(p, POINT.now)[k] + direction[k]
+        there[k] = equation.velocity_of(p, POINT.now)[k] + equation.search(p)[k]
     for b in range(equation.head(p).nbody):
-        if not left * speed_of(p, b, direction) <= allowed(p, b, there):
+        if not left * speed_of(p, b, equation.search(p)) <= allowed(p, b, there):
             return False
         if speed_of(p, b, there) < HELD * numbers.v_c:
             force = HELD_FORCE
@@ -206,15 +222,32 @@ def _keep_best(p, k):
 
 
 @exact
-def _leads_nowhere(p):
-    """Whether the new point is no step on."""
+def _is_refused(p):
+    """Whether the new point is no step on; then the next trial is arranged."""
     progress, now, new = equation.progress(p), equation.scores(p, POINT.now), equation.scores(p, POINT.new)
     if new.error <= progress.loosened:
         return False
     direction = equation.search(p)
     before = linear_algebra.dot(equation.residual_of(p, POINT.now), direction)
     after = linear_algebra.dot(equation.residual_of(p, POINT.new), direction)
-    return not (new.missing < 0.9 * now.missing and after <= 0.2 * abs(before))
+    crossing = -before / (after - before) if after > 0.0 and before < 0.0 else 0.5
+    if progress.by_secant > 0.0:
+        too_far = after > 0.3 * abs(before) and new.missing > 0.7 * now.missing and progress.shortened < 3.0
+        if too_far:
+            _shorten(p, crossing)
+        return too_far
+    if new.missing < 0.9 * now.missing and after <= 0.2 * abs(before):
+        return False
+    _arrange_other(p, crossing)
+    return True
+
+
+@exact
+def _shorten(p, crossing):
+    """Try less of the direction next, near where the missing impulse along it vanishes."""
+    progress = equation.progress(p)
+    progress.share *= min(max(crossing, 0.1), 0.7)
+    progress.shortened += 1.0
 
 
 @exact
@@ -227,6 +260,30 @@ def _all_fresh(p):
 
 
 @exact
+def _arrange_other(p, crossing):
+    """After a step that led nowhere: a derivative of now, beside a body's rest, less of it, or the completed one."""
+    progress, now = equation.progress(p), equation.scores(p, POINT.now)
+    if not _all_fresh(p):
+        progress.is_stale, progress.shortened = 1.0, 0.0
+        return
+    rest = _rest_along(p, equation.search(p), progress.share) if progress.shortened == 0.0 else 0.0
+    if rest > 0.0:
+        _try_along(p, equation.search(p), rest, POINT.new)
+        _keep_best(p, POINT.new)
+        _move(p)
+        progress.is_stale, progress.shortened = 1.0, 0.0
+    elif now.missing < 0.5 * now.scale and progress.shortened < 2.0:  # a face changes its side along the way
+        _shorten(p, crossing)
+    else:
+        progress.failures += 1.0
+        progress.shortened = 0.0
+        if progress.failures == (1.0 if equation.head(p).nbody == 1 else EASED):
+            _ease(p)
+        else:
+            progress.secants_left = min(2.0 * progress.failures, 8.0)
+
+
+@exact
 def _ease(p):
     """Come to the equation by way of smoother ones, where a step of Newton's method leads nowhere.
 
@@ -235,7 +292,7 @@ def _ease(p):
     that, and does not overshoot for bodies that slide on.
     """
     numbers, progress = equation.numbers(p), equation.progress(p)
-    sharp, soft, stages = numbers.v_c, _softest(p), STAGES * int(2.0**progress.failures)
+    sharp, soft, stages = numbers.v_c, _softest(p), STAGES
     fall = (soft / sharp) ** (1.0 / stages)
     for stage in range(stages + 1):
         if worth(p) > BUDGET - RESERVE - 2.0 * DERIVATIVE:
@@ -248,7 +305,7 @@ def _ease(p):
     _keep_best(p, POINT.now)
     linear_algebra.clear(equation.is_fresh(p))
     linear_algebra.clear(equation.misfit(p))
-    progress.is_stale, progress.failures = 1.0, progress.failures + 1.0
+    progress.is_stale = 1.0
 
 
 @exact
@@ -278,6 +335,7 @@ def _linearise_apart(p, fall):
         for r in range(6):
             kept.wrench[r] = out[r]
         differentiate(p, b, kept.twist, 1.0)
+        linear_algebra.copy_matrix(equation.completed(p, b), equation.derivative(p, b))
         kept.known = 1.0
     equation.work(p).evaluations += 1.0
 
@@ -286,10 +344,14 @@ def _linearise_apart(p, fall):
 def _accept(p):
     """Go on from the new point."""
     progress, now, new = equation.progress(p), equation.scores(p, POINT.now), equation.scores(p, POINT.new)
-    left = new.missing / now.missing
-    progress.is_stale = 1.0 if left > 0.3 else 0.0
-    progress.contraction = min(max(left, LEAST_LEFT), 1.0)
-    _update(p, POINT.now, POINT.new)
+    progress.shortened = 0.0
+    if progress.by_secant > 0.0:
+        progress.is_stale = 1.0
+    else:
+        left = new.missing / now.missing
+        progress.is_stale = 1.0 if left > 0.3 else 0.0
+        progress.contraction = min(max(left, LEAST_LEFT), 1.0)
+        _update(p, POINT.now, POINT.new)
     _move(p)
 
 
@@ -301,11 +363,11 @@ def _move(p):
 
 
 @exact
-def _try_along(p, direction, k):
-    """Evaluate the equation a direction from point POINT.now on, into point k."""
+def _try_along(p, direction, t, k):
+    """Evaluate the equation a share t of a direction from point POINT.now on, into point k."""
     v, new = equation.velocity_of(p, POINT.now), equation.velocity_of(p, k)
     for i in range(new.size):
-        new[i] = v[i] + direction[i]
+        new[i] = v[i] + t * direction[i]
     attempt(p, k)
 
 
@@ -332,3 +394,48 @@ def _update(p, old, new):
             for k in range(6):
                 g[r, k] += missed[r] / square * (1.0 if k < 3 else length) * moved[k]
         equation.misfit(p)[b] = size_of(missed, 1.0 / length)
+
+
+@exact
+def _share_to_rest(p, b, direction, share):
+    """The part of a share of a direction from POINT.now on at which body b is nearest to rest, and its change squared.
+
+    The former is negative where the body does not come near to rest on the way.
+    """
+    a, c = doubles(stack_doubles(6), 6), doubles(stack_doubles(6), 6)
+    twist_of(p, b, equation.velocity_of(p, POINT.now), a)
+    twist_of(p, b, direction, c)
+    aa = ac = cc = 0.0
+    for k in range(6):
+        weight = 1.0 if k < 3 else equation.length(p)[b] ** 2
+        c[k] *= share
+        aa += weight * a[k] * a[k]
+        ac += weight * a[k] * c[k]
+        cc += weight * c[k] * c[k]
+    v_c = equation.numbers(p).v_c
+    if cc == 0.0 or ac >= 0.0 or -ac >= cc or aa < (10.0 * v_c) ** 2 or aa - ac * ac / cc > NEAR * aa:
+        return -1.0, cc
+    return -ac / cc, cc
+
+
+@exact
+def _rest_along(p, direction, share):
+    """Share of a direction from point POINT.now on at which a body is beside its rest; 0 where none comes near.
+
+    Before its rest where the sand must push the body on, behind it where the sand must hold it back.
+    """
+    v, there, q = equation.velocity_of(p, POINT.now), equation.there(p), equation.others(p)
+    missing, found = equation.fixed(p), 0.0
+    for b in range(equation.head(p).nbody):
+        t, square = _share_to_rest(p, b, direction, share)
+        if t < 0.0 or (found > 0.0 and t >= found):
+            continue
+        for k in range(v.size):
+            there[k] = v[k] + t * share * direction[k]
+        generalised(p, POINT.now, 0, q)
+        wrench = equation.wrench_of(p, POINT.now, b, 0)
+        add_wrench(p, b, wrench, -1.0, q)
+        residual.fill(p, there, q, missing)
+        side = 1.0 if linear_algebra.dot(missing, direction) < 0.0 else -1.0
+        found = max(t + side * BESIDE * equation.numbers(p).v_c / np.sqrt(square), 1e-12)
+    return found * share
