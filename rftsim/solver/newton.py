@@ -54,8 +54,8 @@ NEAR: Final = 0.25
 BESIDE: Final = 0.3
 """Speed, over v_c, at which a body is tried beside its rest."""
 EASED: Final = 2.0
-"""The failure after which a solution of several bodies is eased; that of a single one is at the first."""
-STAGES: Final = 5
+"""The failure after which a solution of several bodies is eased; a single one is at the first."""
+STAGES: Final = 4
 """Stages of that, after the first."""
 SLIDES: Final = 4.0
 """Speed over v_c from which on a body slides on, whatever v_c is."""
@@ -266,6 +266,10 @@ def _arrange_other(p, crossing):
     if not _all_fresh(p):
         progress.is_stale, progress.shortened = 1.0, 0.0
         return
+    if equation.head(p).nbody == 1 and progress.failures == 0.0:
+        progress.failures = 1.0
+        _ease(p)
+        return
     rest = _rest_along(p, equation.search(p), progress.share) if progress.shortened == 0.0 else 0.0
     if rest > 0.0:
         _try_along(p, equation.search(p), rest, POINT.new)
@@ -277,7 +281,7 @@ def _arrange_other(p, crossing):
     else:
         progress.failures += 1.0
         progress.shortened = 0.0
-        if progress.failures == (1.0 if equation.head(p).nbody == 1 else EASED):
+        if progress.failures == EASED:
             _ease(p)
         else:
             progress.secants_left = min(2.0 * progress.failures, 8.0)
