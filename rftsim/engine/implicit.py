@@ -212,11 +212,11 @@ def _fill_dofs(model, data, m, d, old, i, island, p):
 def _hand_over(model, data, m, d, address, new, i, island, p):
     """Add an island's force to MuJoCo's passive ones, and keep what must last."""
     nv, dofs, first = islands.head(i).nv, islands.dofs(i), islands.dof_start(i)[island]
-    force, lacking = doubles(pointer(d + data.qfrc_passive), nv), state.lacking(new, nv)
+    force, lacking, after = doubles(pointer(d + data.qfrc_passive), nv), state.lacking(new, nv), state.after(new, nv)
     for k in range(equation.head(p).ndof):
         dof = dofs[first + k]
         force[dof] += equation.out(p)[k]
-        lacking[dof] = equation.lacking(p)[k]
+        lacking[dof], after[dof] = equation.lacking(p)[k], equation.after(p)[k]
     first = islands.body_start(i)[island]
     for b in range(equation.head(p).nbody):
         k = islands.near(i)[islands.members(i)[first + b]]

@@ -12,7 +12,7 @@ def copy(x, out):
 
 @exact
 def clear(x):
-    """Fill x with zeros."""
+    """Fill a vector with zeros, in place."""
     for i in range(x.size):
         x[i] = 0.0
 

@@ -14,9 +14,10 @@ from rftsim.machine.compiling import exact
 from rftsim.solver import constraint_rows, equation, linear_algebra, sparse
 from rftsim.solver.equation import KIND, POINT
 from rftsim.solver.motion import generalised, speed_of, twist_of
-from rftsim.solver.newton import BUDGET, RESERVE, solve, worth
+from rftsim.solver.newton import solve
 from rftsim.solver.sinking import deepest, sink
 from rftsim.solver.step_equation import answer_to, force_to, prepare, reset
+from rftsim.solver.steps import BUDGET, RESERVE, worth
 
 FINENESS: Final = 2.0
 """Error of the position in a step, over the depth and the tolerance, above which the step is split."""

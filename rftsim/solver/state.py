@@ -1,6 +1,6 @@
 """The state that the implicit force keeps from step to step, as numbers; all zero is "nothing known".
 
-Whether a step was made, then nv numbers of `lacking`, then a record of KEPT for each body of the bed.
+Whether a step was made, then nv numbers each of `lacking` and `after`, then a record of KEPT for each body of the bed.
 """
 
 from typing import Final
@@ -30,7 +30,7 @@ kept_at = record_at(KEPT)
 @inline
 def state_size(nbody, nv):
     """Numbers that last from step to step, of a bed of so many bodies in a model of so many degrees of freedom."""
-    return 1 + nv + KEPT_NUMBERS * nbody
+    return 1 + 2 * nv + KEPT_NUMBERS * nbody
 
 
 @inline
@@ -46,6 +46,12 @@ def lacking(address, nv):
 
 
 @inline
+def after(address, nv):
+    """MuJoCo's velocity after the step, as it was solved for, (nv,), of the state at an address; else zero."""
+    return doubles(address + 8 * (1 + nv), nv)
+
+
+@inline
 def kept(address, nv, k):
     """Address of the record KEPT of the k-th body of the state at an address."""
-    return address + 8 * (1 + nv + KEPT_NUMBERS * k)
+    return address + 8 * (1 + 2 * nv + KEPT_NUMBERS * k)

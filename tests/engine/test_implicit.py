@@ -7,8 +7,7 @@ import pytest
 import rftsim
 from rftsim.bench import hard_cases, stability
 from rftsim.files import Kept
-from rftsim.law.layout import numbers_in, record
-from rftsim.solver.state import FLAGS
+from rftsim.solver.state import KEPT
 from rftsim.solver.time_step import GAIN
 
 SAND = rftsim.Sand(xi_n=0.92e6, mu_surf=0.4)
@@ -88,10 +87,10 @@ def foreseen(trial, steps, before=None):
         if before is not None:
             before(data)
         mujoco.mj_step(model, data)
-        start = numbers_in(FLAGS) + 3 * model.nv
-        expected = data.plugin_state[start : start + model.nv]
-        if expected.any():
-            worst = max(worst, np.abs(expected - data.qvel).max() / np.abs(data.qvel).max())
+        expected = data.plugin_state[1 + model.nv : 1 + 2 * model.nv]
+        solved = expected != 0.0  # the degrees of freedom of islands that have a body near the sand
+        if solved.any():
+            worst = max(worst, np.abs(expected - data.qvel)[solved].max() / np.abs(data.qvel).max())
     return worst
 
 
@@ -138,7 +137,7 @@ def test_random_starts_gain_no_energy(seed):
         mujoco.mj_step(model, data)
         sand = data.qfrc_passive - data.qfrc_spring - data.qfrc_damper - data.qfrc_gravcomp - data.qfrc_fluid
         assert 0.5 * 5e-3 * sand @ (before + data.qvel) < 1e-9
-        split += record(data.plugin_state, FLAGS).split > 0.0
+        split += (data.plugin_state[1 + 2 * model.nv :].view(KEPT)["drift"] > 0.0).any()
     assert split > 5
     assert not trial.failed
 
@@ -160,7 +159,7 @@ def test_forward_leaves_no_trace():
 def test_a_body_at_rest_creeps_slowly(speed):
     """A ball that is pushed with half of what the sand bears creeps at v_c / sqrt(3).
 
-    v_c is 3e-7 m/s, and 1e-4 of the speed of another body where one moves.
+    v_c is 3e-7 m/s, however fast a body moves that nothing joins it to: each island has an equation of its own.
     """
     xml = """
         <mujoco>
@@ -181,7 +180,7 @@ def test_a_body_at_rest_creeps_slowly(speed):
     data.ctrl[0] = data.qvel[1] = speed
     mujoco.mj_step(model, data, nstep=200)
     assert data.qvel[1] == pytest.approx(speed, abs=1e-2)
-    assert data.qvel[0] == pytest.approx(max(3e-7, 1e-4 * speed) / np.sqrt(3.0), rel=0.05)
+    assert data.qvel[0] == pytest.approx(3e-7 / np.sqrt(3.0), rel=0.05)
 
 
 def test_medians_are_over_what_has_an_answer(tmp_path):
