@@ -6,7 +6,7 @@ from rftsim.machine.compiling import exact
 from rftsim.machine.memory import doubles, stack_doubles
 from rftsim.solver import equation, linear_algebra, linearised, sparse
 from rftsim.solver.equation import POINT
-from rftsim.solver.motion import add_wrench, evaluate, generalised, speed_of, twist_of
+from rftsim.solver.motion import add_wrench, differentiate, evaluate, generalised, speed_of, twist_of
 
 CENTRED: Final = 3e-3
 """Effect of the force's change within a step on a body's velocity, relative, from which on it is counted."""
@@ -29,9 +29,14 @@ def centre(p, accepted):
     if accepted:
         for k in range(v.size):
             end[k] = v[k] + equation.search(p)[k]
+        _follow(p)
+    elif equation.numbers(p).solved == 0.0:  # a step by what cannot overshoot, so that no body is kicked
+        _complete(p)
+        linearised.solution(p, v, equation.residual_of(p, POINT.best), linearised.EXACT, end)
+        _follow(p)
+        return
     else:
         linearised.solution(p, v, equation.residual_of(p, POINT.best), linearised.EXACT, end)
-    _follow(p)
     for k in range(v.size):
         mean[k] = end[k] - start[k]
     if _largest(p, mean, end) <= 2.0:
@@ -44,8 +49,19 @@ def centre(p, accepted):
 
 
 @exact
+def _complete(p):
+    """Take the completed derivatives at the best point for the bodies' derivatives."""
+    twist = doubles(stack_doubles(6), 6)
+    for b in range(equation.head(p).nbody):
+        twist_of(p, b, equation.velocity_of(p, POINT.best), twist)
+        differentiate(p, b, twist, 1.0)
+        linear_algebra.copy_matrix(equation.completed(p, b), equation.derivative(p, b))
+        equation.kept(p, b).known = 1.0
+
+
+@exact
 def _follow(p):
-    """Take the best point's wrenches to `end`, as the derivatives foresee."""
+    """Take the best point, and its wrenches, to `end`, as the derivatives foresee."""
     change, twist, wrench = equation.change(p), doubles(stack_doubles(6), 6), doubles(stack_doubles(6), 6)
     v, end = equation.velocity_of(p, POINT.best), equation.end(p)
     for k in range(v.size):
@@ -59,6 +75,7 @@ def _follow(p):
         for r in range(6):
             now[r] += wrench[r]
             later[r] += wrench[r]
+    linear_algebra.copy(end, v)
 
 
 @exact

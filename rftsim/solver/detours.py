@@ -67,7 +67,7 @@ def _arrange_other(p, crossing):
     """After a step that led nowhere: a derivative of now, beside a body's rest, less of it, or the completed one."""
     progress, now = equation.progress(p), equation.scores(p, POINT.now)
     if not _all_fresh(p):
-        progress.is_stale, progress.shortened = 1.0, 0.0
+        progress.is_stale, progress.shortened = 2.0, 0.0  # all of them
         return
     if equation.head(p).nbody == 1 and progress.failures == 0.0:
         progress.failures = 1.0

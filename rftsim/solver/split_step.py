@@ -186,10 +186,10 @@ def _leave_to_mujoco(p, touched):
 @exact
 def remember(p):
     """Keep each body's force at the end of the solution at hand, at the later depths, for the next one."""
-    end = equation.end(p)
+    v = equation.velocity_of(p, POINT.best)
     for b in range(equation.head(p).nbody):
         kept = equation.kept(p, b)
-        twist_of(p, b, end, kept.twist)
+        twist_of(p, b, v, kept.twist)
         linear_algebra.copy(equation.wrench_of(p, POINT.best, b, 1), kept.wrench)
 
 

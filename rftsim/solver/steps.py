@@ -82,7 +82,7 @@ def _refresh(p):
             misfit[b] = 1e300
         largest = max(largest, misfit[b] if fresh[b] == 0.0 else 0.0)
     for b in range(fresh.size):
-        if fresh[b] == 0.0 and (misfit[b] >= POOR * largest):
+        if fresh[b] == 0.0 and (misfit[b] >= POOR * largest or equation.progress(p).is_stale > 1.0):
             twist_of(p, b, equation.velocity_of(p, POINT.now), twist)
             differentiate(p, b, twist, 0.0)
             fresh[b], misfit[b], equation.kept(p, b).known = 1.0, 0.0, 1.0
