@@ -28,7 +28,7 @@ QUICK: Final = (1e-4, 3e-3, 1e-1)
 """Tolerances of a quick study."""
 QUICK_STEPS: Final = (5e-3,)
 """Time steps of a quick study [s]."""
-REPEATS: Final = 9
+REPEATS: Final = 25
 """Repetitions of all runs in turn; the median of a run's times counts."""
 ALLOWED: Final = 1.5
 """Largest error that is as good as the finest tolerance's, over that one."""

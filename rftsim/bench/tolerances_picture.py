@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from rftsim.bench.pareto_picture import number_plainly
 from rftsim.bench.stability import LOST
 from rftsim.bench.tolerances import Solved
 from rftsim.view.figure import make_figure, save_figure
@@ -22,7 +23,9 @@ def plot_tolerances(rows: list[Solved], path: Path) -> None:
         axis.set_title(name)
         axis.set_xlabel("processor time of a step [µs]")
         axis.set_ylabel("error of the path [%]")
+        axis.margins(0.12)
         axis.grid(alpha=0.3)
+        number_plainly(axis.xaxis, axis.yaxis)
         axis.legend()
     figure.suptitle("The tolerance of the implicit force, against the finest one at 0.1 ms")
     save_figure(figure, path)
