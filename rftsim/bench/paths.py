@@ -15,7 +15,7 @@ from rftsim.surface.triangles import Array
 REFERENCE_STEP: Final = 1e-4
 """Time step of the reference's path [s]."""
 SAMPLE: Final = 1e-2
-"""Time between two positions that are compared, and after which controls are new [s]."""
+"""Time between two positions that are compared, and at which controls may be new [s]."""
 
 
 class Followed(NamedTuple):

@@ -41,6 +41,11 @@ def trotting() -> mujoco.MjData:
     return data
 
 
+def _targets(model: mujoco.MjModel, time: float) -> Array:
+    """Targets of the trot that are held at a time since its start, which is at the beginning of a stride."""
+    return trot(model, RENEWED * math.floor(time / RENEWED + 1e-6))
+
+
 def _bare() -> mujoco.MjSpec:
     spec = build_quadruped()
     spec.option.timestep = H
@@ -62,6 +67,6 @@ QUADRUPED: Final = Subject(
     lambda model, data: put(data, trotting()),
     0.02,
     0.3,
-    trot,
+    _targets,
 )
 """The quadruped in its trot."""

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import rftsim
-from rftsim.bench import environment, others, pareto, tolerances
+from rftsim.bench import environment, others, pareto, paths, quadruped, tolerances
 from rftsim.bench.cases import OWN, draw_controls
 from rftsim.bench.environment_picture import plot_environment
 from rftsim.bench.pareto import Compared, Tried
@@ -106,6 +106,15 @@ def test_the_quadruped_trots():
     assert data.qpos[0] > begun.qpos[0] + 0.1
     assert data.qpos[2] > 0.2
     assert rftsim.work(data.model, data).unsolved <= 1
+
+
+def test_the_quadruped_is_followed_as_it_is_timed():
+    """A path of it takes the controls that the study of the environment takes, whatever the time step."""
+    begun = quadruped.trotting()
+    spans = OWN["quadruped", "rft3d"].move(begun, 60)
+    for k in range(30):
+        held = quadruped.QUADRUPED.move(begun.model, k * paths.SAMPLE)
+        assert np.allclose(held, spans[k // 2].ctrl, atol=1e-9)
 
 
 def test_spheres_lie_in_the_sand():
