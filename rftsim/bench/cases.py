@@ -1,18 +1,15 @@
 """Cases of the study of the environment: how each is made without sand and with it, how it starts, and is moved."""
 
 import dataclasses
-import math
 from collections.abc import Callable, Mapping
 from typing import Final, Literal, NamedTuple
 
 import mujoco
 import numpy as np
-from rftsim_models import parts
-from rftsim_models.quadruped import DIAGONALS, FEET, JOINTS, LEGS, build_quadruped
 
-from rftsim.bench.subjects import SETTLING, SUBJECTS, in_motion
-from rftsim.model.add_sand import WHOLE, Force, add_sand
-from rftsim.run.scenes import POPPY
+from rftsim.bench.quadruped import QUADRUPED, RENEWED, trot, trotting
+from rftsim.bench.subjects import SUBJECTS, in_motion
+from rftsim.model.add_sand import Force
 from rftsim.surface.triangles import Array
 
 Ground = Literal["none", "explicit", "implicit"]
@@ -21,14 +18,8 @@ GROUNDS: Final[tuple[Ground, ...]] = ("none", "explicit", "implicit")
 """Every ground; the first is the one that the others are compared with."""
 FORCES: Final[tuple[Force, ...]] = ("explicit", "implicit")
 """Every kind of force."""
-H: Final = 5e-3
-"""Time step of what is not shipped with one [s]."""
 WINDOW: Final = 0.2
 """Time that is simulated in each repetition, of what moves on as it does [s]."""
-STRIDE: Final = 0.5
-"""Duration of two steps of the quadruped's trot [s]."""
-RENEWED: Final = 4
-"""Time steps after which the quadruped's targets are new."""
 
 
 class Span(NamedTuple):
@@ -77,15 +68,6 @@ def hold(data: mujoco.MjData, steps: int) -> list[Span]:
     return [Span(data.ctrl.copy(), steps)]
 
 
-def settle(model: mujoco.MjModel, duration: float = SETTLING) -> mujoco.MjData:
-    """Make data of a model that was left alone for a duration [s], from its keyframe where it has one."""
-    data = mujoco.MjData(model)
-    if model.nkey:
-        mujoco.mj_resetDataKeyframe(model, data, 0)
-    mujoco.mj_step(model, data, nstep=round(duration / model.opt.timestep))
-    return data
-
-
 def _of_subject(name: str, law: str, *, quick: bool = True) -> Case:
     def prepare() -> Prepared:
         subject = SUBJECTS[name]
@@ -96,38 +78,17 @@ def _of_subject(name: str, law: str, *, quick: bool = True) -> Case:
     return Case(name, law, prepare, hold, quick=quick)
 
 
-def _build_quadruped() -> mujoco.MjSpec:
-    spec = build_quadruped()
-    spec.option.timestep = H
-    return spec
-
-
 def _prepare_quadruped() -> Prepared:
-    models: dict[Ground, mujoco.MjModel] = {"none": _build_quadruped().compile()}
-    for force in FORCES:
-        spec, options = _build_quadruped(), {**WHOLE, "max_edge": math.inf, "bodies": (parts.TORSO, *FEET)}
-        add_sand(spec, POPPY, "rft3d", force=force, draw=False, **options)
-        models[force] = spec.compile()
-    data = settle(models["implicit"])
-    for span in _trot(data, round(SETTLING / H)):
-        data.ctrl[:] = span.ctrl
-        mujoco.mj_step(data.model, data, nstep=span.steps)
-    return Prepared(models, dict.fromkeys(GROUNDS, data))
+    models: dict[Ground, mujoco.MjModel] = {"none": QUADRUPED.bare().compile()}
+    models |= {force: QUADRUPED.stage("rft3d", force=force).model for force in FORCES}
+    return Prepared(models, dict.fromkeys(GROUNDS, trotting()))
 
 
 def _trot(data: mujoco.MjData, steps: int) -> list[Span]:
-    """Controls of the quadruped's trot: diagonal legs lift their feet and swing ahead together."""
-    key, spans = data.model.key_ctrl[0], []
-    for k in range(0, steps, RENEWED):
-        ctrl = key.copy()
-        for pair, legs in enumerate(DIAGONALS):
-            phase = 2.0 * math.pi * (data.time + k * H) / STRIDE + math.pi * pair
-            lift, swing = max(math.sin(phase), 0.0), math.cos(phase)
-            for leg in legs:
-                ctrl[JOINTS.index(f"hip_{LEGS[leg]}")] += 0.15 * swing + 0.3 * lift
-                ctrl[JOINTS.index(f"knee_{LEGS[leg]}")] -= 0.6 * lift
-        spans.append(Span(ctrl, min(RENEWED, steps - k)))
-    return spans
+    """Controls of the quadruped's trot, from where it is in it."""
+    h = data.model.opt.timestep
+    each = round(RENEWED / h)
+    return [Span(trot(data.model, data.time + k * h), min(each, steps - k)) for k in range(0, steps, each)]
 
 
 OWN: Final[Mapping[tuple[str, str], Case]] = {

@@ -10,8 +10,9 @@ from typing import Final, NamedTuple
 import mujoco
 import numpy as np
 
-from rftsim.bench.cases import FORCES, GROUNDS, WINDOW, Case, Ground, H, Prepared, draw_controls, hold, settle
+from rftsim.bench.cases import FORCES, GROUNDS, WINDOW, Case, Ground, Prepared, draw_controls, hold
 from rftsim.bench.quiet import quiet
+from rftsim.bench.subjects import H, settle
 from rftsim.bench.trials import is_lost
 from rftsim.model.add_sand import Force, add_sand, read_spec
 

@@ -7,17 +7,17 @@ How far the laws are from one another is told beside that.
 import math
 import statistics
 import sys
-import time
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, Final, Literal, NamedTuple
 
-import mujoco
 import numpy as np
 
-from rftsim.bench import subjects
+from rftsim.bench import paths, quadruped, subjects, tolerances
 from rftsim.bench.memory import remember
+from rftsim.bench.paths import REFERENCE_STEP, Followed, distance, follow
 from rftsim.bench.subjects import SUBJECTS, Subject
+from rftsim.bench.tolerances import Solved
 from rftsim.bench.trials import Force
 from rftsim.model.reach import sampled_reach
 from rftsim.model.readout import instances
@@ -27,16 +27,14 @@ from rftsim.surface.triangles import Array
 
 STEPS: Final = (5e-4, 1e-3, 2e-3, 5e-3, 1e-2)
 """Time steps that are tried [s]."""
-REFERENCE_STEP: Final = 1e-4
-"""Time step of the reference's path [s]."""
-SAMPLE: Final = 1e-2
-"""Time between two positions that are compared [s]."""
 REPEATS: Final = 3
 """Repetitions of all runs in turn; the median of a run's times counts."""
 LESS: Final = 0.7
 """Largest share of another's error that counts as better."""
 SEED: Final = 7
 """Seed of the poses and motions at which wrenches are compared; economies were sought at others."""
+MODULES: Final = (subjects, quadruped, paths, tolerances, facets, measure, reduce, samples)
+"""What measurements depend on, beside this module and what is compiled."""
 Mesh = Literal["fine", "shipped", "1 %", "3 %", "10 %"]
 MESHES: Final[tuple[Mesh, ...]] = ("fine", "shipped", "1 %", "3 %", "10 %")
 """Every triangle of the fine mesh; the model's own; the fewest facets found of the fine mesh within a tolerance."""
@@ -84,11 +82,11 @@ class Study:
 
     Args:
         path: The file; what was measured with these sources on this MuJoCo is not measured again.
-        quick: Each subject's own law, its own mesh and 10 %, at 1 and 5 ms.
+        quick: Each subject's own law, its own mesh and 10 %, at 1 and 5 ms; three tolerances at 5 ms.
     """
 
     def __init__(self, path: Path, quick: bool) -> None:
-        self.kept = remember(path, subjects, facets, measure, reduce, samples, sys.modules[__name__])
+        self.kept = remember(path, *MODULES, sys.modules[__name__])
         self.quick = quick
 
     def laws(self, name: str) -> tuple[str, ...]:
@@ -103,6 +101,12 @@ class Study:
         tried, path = self.kept.get(key, lambda: _compare(name, law, meshes, steps))
         return Compared([Tried(*one) for one in tried], np.array(path))
 
+    def solved(self, name: str) -> list[Solved]:
+        """A subject at every tolerance of the implicit force, measured now or before."""
+        ways = (tolerances.QUICK, tolerances.QUICK_STEPS) if self.quick else (tolerances.TOLERANCES, tolerances.STEPS)
+        key = f"tolerance/{name}{'/quick' if self.quick else ''}"
+        return [Solved(*one) for one in self.kept.get(key, lambda: tolerances.measure(name, *ways))]
+
 
 def run(study: Study, names: Iterable[str], report: Callable[[str], Any]) -> list[Compared]:
     """Every subject under every law; `report` is called with what was done."""
@@ -111,6 +115,15 @@ def run(study: Study, names: Iterable[str], report: Callable[[str], Any]) -> lis
         for law in study.laws(name):
             found.append(study.compared(name, law))
             report(f"{name}, {law}")
+    return found
+
+
+def run_tolerances(study: Study, names: Iterable[str], report: Callable[[str], Any]) -> list[Solved]:
+    """Every subject at every tolerance; `report` is called with what was done."""
+    found = []
+    for name in names:
+        found += study.solved(name)
+        report(f"{name}, tolerances")
     return found
 
 
@@ -131,7 +144,7 @@ def laws_apart(compared: list[Compared]) -> dict[tuple[str, str], float]:
     for each in compared:
         first = each.tried[0]
         path = own.setdefault(first.subject, each.path)
-        found[first.subject, first.law] = _distance(each.path, path)
+        found[first.subject, first.law] = distance(each.path, path)
     return found
 
 
@@ -139,22 +152,22 @@ def _compare(name: str, law: str, meshes: Iterable[Mesh], steps: Iterable[float]
     """Try meshes and time steps of a subject under a law; returns them, and the reference's path as JSON has it."""
     subject = SUBJECTS[name]
     fine = _staged(subject, law, "fine", "implicit")
-    path, _ = _path(subject, fine, REFERENCE_STEP)
+    path = follow(subject, fine, REFERENCE_STEP).path
     kinds: list[tuple[Mesh, Force]] = [(mesh, "implicit") for mesh in meshes]
     ways = {(mesh, force): _staged(subject, law, mesh, force) for mesh, force in [*kinds, ("shipped", "explicit")]}
-    paths: dict[tuple[Mesh, Force, float], list[tuple[Array, float]]] = {}
+    paths: dict[tuple[Mesh, Force, float], list[Followed]] = {}
     for _ in range(REPEATS):
         for (mesh, force), staged in ways.items():
             for h in steps:
-                paths.setdefault((mesh, force, h), []).append(_path(subject, staged, h))
+                paths.setdefault((mesh, force, h), []).append(follow(subject, staged, h))
     tried = []
     for (mesh, force), staged in ways.items():
         elements = sum(surface.ntri for surface in staged.bed.surfaces.values())
         wrong = _wrench_error(fine, staged)
         for h in steps:
             runs = paths[mesh, force, h]
-            seconds = statistics.median(seconds for _, seconds in runs)
-            tried.append(Tried(name, law, mesh, elements, wrong, force, h, _distance(runs[0][0], path), seconds))
+            seconds = statistics.median(run.seconds for run in runs)
+            tried.append(Tried(name, law, mesh, elements, wrong, force, h, distance(runs[0].path, path), seconds))
     return tried, path.tolist()
 
 
@@ -164,32 +177,6 @@ def _staged(subject: Subject, law: str, mesh: Mesh, force: Force) -> Staged:
     if mesh == "fine":
         return subject.stage(law, force=force, max_edge=subject.fine)
     return subject.stage(law, force=force, max_edge=subject.fine, reduction=float(mesh.removesuffix(" %")) / 100)
-
-
-def _path(subject: Subject, staged: Staged, h: float) -> tuple[Array, float]:
-    """Positions of the measured body [m], (n, 3), nan once it is lost; and the processor time of a step [s]."""
-    model = staged.model
-    model.opt.timestep = h
-    data, body = subject.start(model), model.body(staged.measured.body).id
-    total, each = round(subject.duration / SAMPLE), round(SAMPLE / h)
-    path, spent = np.full((total + 1, 3), np.nan), 0.0
-    path[0] = data.xpos[body]
-    for k in range(total):
-        started = time.thread_time()
-        mujoco.mj_step(model, data, nstep=each)
-        spent += time.thread_time() - started
-        if any(warning.number for warning in data.warning):
-            break
-        mujoco.mj_kinematics(model, data)
-        path[k + 1] = data.xpos[body]
-    return path, spent / ((k + 1) * each)
-
-
-def _distance(path: Array, reference: Array) -> float:
-    """Largest distance between two paths at the same time, over the length of the reference."""
-    largest = np.linalg.norm(path - reference, axis=1).max()
-    length = np.linalg.norm(np.diff(reference, axis=0), axis=1).sum()
-    return float(largest / length) if np.isfinite(largest) else math.inf
 
 
 def _wrench_error(fine: Staged, staged: Staged) -> float:

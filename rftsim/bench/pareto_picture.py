@@ -42,10 +42,10 @@ def _label(axis: Any, name: str) -> None:
     axis.grid(alpha=0.3)
     above = axis.secondary_xaxis("top", functions=(_inverse, _inverse))
     above.set_xlabel("times real time")
-    _number_plainly(axis.xaxis, axis.yaxis, above.xaxis)
+    number_plainly(axis.xaxis, axis.yaxis, above.xaxis)
 
 
-def _number_plainly(*axes: Any) -> None:
+def number_plainly(*axes: Any) -> None:
     """Write plain numbers at 1, 2 and 5 of each decade of logarithmic axes."""
     from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 

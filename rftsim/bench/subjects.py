@@ -13,7 +13,10 @@ from rftsim_models.hexapod import LEGS, TRIPODS, build_hexapod
 
 from rftsim.model.add_sand import WHOLE, add_sand
 from rftsim.run.scenes import POPPY, SCENES, Measured, Staged, stage
+from rftsim.surface.triangles import Array
 
+H: Final = 5e-3
+"""Time step of what is not shipped with one [s]."""
 GAIT: Final = 10.0
 """Rate of the hexapod's legs [rad/s]."""
 SETTLING: Final = 1.0
@@ -32,6 +35,7 @@ class Subject:
         begin: Sets its data to its start.
         fine: Longest edge of its finest mesh [m].
         duration: Time that its path is compared for [s].
+        move: Makes its controls from the time since its start [s]; None where they stay as they are at its start.
     """
 
     says: str
@@ -41,6 +45,7 @@ class Subject:
     begin: Callable[[mujoco.MjModel, mujoco.MjData], None]
     fine: float
     duration: float
+    move: Callable[[mujoco.MjModel, float], Array] | None = None
 
     def start(self, model: mujoco.MjModel) -> mujoco.MjData:
         """Make data of a model of this subject, at its start."""
@@ -68,7 +73,7 @@ def _from_key(model: mujoco.MjModel, data: mujoco.MjData) -> None:
 
 def _hexapod_without_sand() -> mujoco.MjSpec:
     spec = build_hexapod()
-    spec.option.timestep = 5e-3
+    spec.option.timestep = H
     return spec
 
 
@@ -120,3 +125,12 @@ def put(data: mujoco.MjData, moving: mujoco.MjData) -> None:
     mujoco.mj_resetData(data.model, data)
     for name in ("qpos", "qvel", "ctrl", "act", "qacc_warmstart"):
         getattr(data, name)[:] = getattr(moving, name)
+
+
+def settle(model: mujoco.MjModel, duration: float = SETTLING) -> mujoco.MjData:
+    """Make data of a model that was left alone for a duration [s], from its keyframe where it has one."""
+    data = mujoco.MjData(model)
+    if model.nkey:
+        mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_step(model, data, nstep=round(duration / model.opt.timestep))
+    return data

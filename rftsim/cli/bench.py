@@ -22,7 +22,8 @@ class Bench:
     environment: the time that sand adds to MuJoCo's step, in one simulation and in 256 side by side: shipped robots,
     free spheres, and robots of others where they are installed (gymnasium, dm_control, MENAGERIE_ROOT).
 
-    pareto: laws, triangles and time steps: what each costs, and how far it is from the finest.
+    pareto: laws, triangles and time steps, and the tolerance of the implicit force: what each costs, and how far it is
+    from the finest.
 
     kernel: the time of a buried triangle by the size of the body, over that of the tests' NumPy, and the share of what
     the processor's arithmetic allows.
@@ -36,19 +37,19 @@ class Bench:
     study: tyro.conf.Positional[Literal["stability", "kernel", "environment", "pareto", "solver"]]
     """The study to run: what is measured, see above."""
     cases: tuple[str, ...] = ()
-    """Names of the hard cases that stability and solver play, or of the cases that environment times (wheel, go1); by
-    default all."""
+    """Names of the hard cases that stability and solver play, of the cases that environment times (wheel, go1), or of
+    the parts of pareto (laws, tolerance); by default all."""
     starts: int = 1000
     """Random starts of a free body on legs, of stability."""
     scenes: int = 300
     """Articulated scenes of solver, drawn from the seeds 0, 1, ..."""
     quick: bool = False
-    """Fewer time steps, cases, random starts and scenes; bodies of up to 20,480 triangles; fewer repetitions; one law
-    each."""
+    """Fewer time steps, cases, tolerances, random starts and scenes; bodies of up to 20,480 triangles; fewer
+    repetitions; one law each."""
     oracle: Path = Path("tests/oracle.py")
     """The tests' laws in NumPy, that kernel compares with where they are there."""
     plot: Path | None = None
-    """Folder for the study's picture, NAME.png; solver has none."""
+    """Folder for the study's picture, NAME.png, and tolerance.png of pareto's second part; solver has none."""
     memory: Path = Path("out/bench")
     """Folder for what stability, pareto and solver measured: stopped, they go on from there."""
     json: bool = False
@@ -61,7 +62,7 @@ class Bench:
         elif self.study == "environment":
             time_environment(self.cases, self.quick, self.plot, self.json)
         elif self.study == "pareto":
-            compare_speeds(self.quick, self.memory, self.plot, self.json)
+            compare_speeds(self.cases, self.quick, self.memory, self.plot, self.json)
         elif self.study == "solver":
             weigh_solver(self.cases, self.scenes, self.quick, self.memory, self.json)
         else:

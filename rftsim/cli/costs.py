@@ -3,23 +3,30 @@
 import itertools
 import math
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 
-from rftsim.bench import environment, kernel, pareto
+from rftsim.bench import environment, kernel, pareto, tolerances
 from rftsim.bench.cases import GROUNDS
 from rftsim.bench.environment import Timed
 from rftsim.bench.environment_picture import plot_environment
 from rftsim.bench.kernel_picture import plot_kernel
 from rftsim.bench.pareto import Compared, Tried
 from rftsim.bench.pareto_picture import plot_pareto
+from rftsim.bench.paths import REFERENCE_STEP
 from rftsim.bench.subjects import SUBJECTS
+from rftsim.bench.tolerances import Solved
+from rftsim.bench.tolerances_picture import plot_tolerances
 from rftsim.cli.output import make_table, print_json, print_line, print_written, progress
 from rftsim.cli.results import draw, picture_in, remembered_in
+from rftsim.errors import RftsimError
 
 ROUNDS = 15
 """Repetitions of each measurement."""
+PARTS = {"laws": tuple(SUBJECTS), "tolerance": tuple(tolerances.SOLVED)}
+"""The subjects of each part of pareto."""
 
 
 def time_kernel(quick: bool, oracle: Path, plot: Path | None, json: bool) -> None:
@@ -83,37 +90,84 @@ def time_environment(names: tuple[str, ...], quick: bool, plot: Path | None, jso
     print_written(console, picture)
 
 
-def compare_speeds(quick: bool, memory: Path, plot: Path | None, json: bool) -> None:
-    """Compare laws, triangles and time steps: `rftsim bench pareto`."""
-    picture = picture_in(plot, "pareto")
+def compare_speeds(parts: tuple[str, ...], quick: bool, memory: Path, plot: Path | None, json: bool) -> None:
+    """Compare laws, triangles and time steps, and tolerances: `rftsim bench pareto`."""
+    laws, solved = _choose_parts(parts)
+    laws_picture = picture_in(plot if laws else None, "pareto")
+    solved_picture = picture_in(plot if solved else None, "tolerance")
     study = pareto.Study(remembered_in(memory, "pareto"), quick)
-    with progress("pareto", sum(len(study.laws(name)) for name in SUBJECTS), json) as report:
-        compared = pareto.run(study, SUBJECTS, report)
-    apart = pareto.laws_apart(compared)
-    draw(picture, plot_pareto, compared)
+    with progress("pareto", sum(len(study.laws(name)) for name in laws) + len(solved), json) as report:
+        compared = pareto.run(study, laws, report)
+        rows = pareto.run_tolerances(study, solved, report)
+    draw(laws_picture, plot_pareto, compared)
+    draw(solved_picture, plot_tolerances, rows)
     if json:
-        print_json(
-            {
-                "tried": [one._asdict() for each in compared for one in each.tried],
-                "front": [one._asdict() for one in _front(compared)],
-                "laws_apart": {f"{name}, {law}": value for (name, law), value in apart.items()},
-            }
-        )
+        print_json({**(_laws_json(compared) if laws else {}), **(_tolerances_json(rows) if solved else {})})
         return
     console = Console()
+    if laws:
+        _print_laws(console, compared)
+    if solved:
+        _print_tolerances(console, rows)
+    print_written(console, laws_picture, solved_picture)
+
+
+def _choose_parts(parts: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """The subjects of the parts of pareto, laws and tolerances, that were asked for; none for all."""
+    for name in parts:
+        if name not in PARTS:
+            raise RftsimError(f"pareto has no part {name!r}; --cases takes {', '.join(PARTS)}")
+    laws, solved = (subjects if name in (parts or PARTS) else () for name, subjects in PARTS.items())
+    return laws, solved
+
+
+def _laws_json(compared: list[Compared]) -> dict[str, Any]:
+    return {
+        "tried": [one._asdict() for each in compared for one in each.tried],
+        "front": [one._asdict() for one in _front(compared)],
+        "laws_apart": {f"{name}, {law}": value for (name, law), value in pareto.laws_apart(compared).items()},
+    }
+
+
+def _tolerances_json(rows: list[Solved]) -> dict[str, Any]:
+    advice = tolerances.advise(rows)
+    return {"tolerance": [row._asdict() for row in rows], "advice": advice._asdict() if advice else None}
+
+
+def _print_laws(console: Console, compared: list[Compared]) -> None:
     console.print(_meshes_table(compared))
     console.print(_front_table(_front(compared)))
     print_line(
         console,
         "ms: time step; error: largest distance from the path of the same law with all triangles of the fine mesh at "
-        f"{1e3 * pareto.REFERENCE_STEP:g} ms, over that path's length; µs: processor time of a step; "
+        f"{1e3 * REFERENCE_STEP:g} ms, over that path's length; µs: processor time of a step; "
         "real: times real time",
     )
-    for (name, law), value in apart.items():
+    for (name, law), value in pareto.laws_apart(compared).items():
         if value > 0.0:
             says = f"{name}: the path under {law} lies {_percent(value)} % from that under {SUBJECTS[name].laws[0]}"
             print_line(console, says)
-    print_written(console, picture)
+
+
+def _print_tolerances(console: Console, rows: list[Solved]) -> None:
+    console.print(_tolerances_table(rows))
+    print_line(
+        console,
+        "µs: processor time of a step; work: evaluations and derivatives of the force in a step; unsolved: equations "
+        "outside the tolerance, over all steps; error: largest distance from the path of the same mesh at "
+        f"{1e3 * REFERENCE_STEP:g} ms and {tolerances.TOLERANCES[0]:g}, over that path's length",
+    )
+    print_line(console, _say_advice(tolerances.advise(rows)))
+
+
+def _say_advice(advice: tolerances.Advice | None) -> str:
+    if advice is None:
+        return "for training: no tolerance is recommended, as the finest one loses a simulation"
+    each = ", ".join(f"{name} {tolerance:g}" for name, tolerance in advice.each.items())
+    return (
+        f"for training at {1e3 * advice.h:g} ms: tolerance {advice.common:g} for all, the cheapest whose error is "
+        f"within {tolerances.ALLOWED:g} times that of {advice.finest:g}; each by itself: {each}"
+    )
 
 
 def _front(compared: list[Compared]) -> list[Tried]:
@@ -195,6 +249,22 @@ def _front_table(front: list[Tried]) -> Table:
             f"{1e6 * one.seconds:.1f}",
             f"× {1.0 / one.cost:.0f}",
             end_section=last,
+        )
+    return table
+
+
+def _tolerances_table(rows: list[Solved]) -> Table:
+    table = make_table("tolerance", ("scene",), ("ms", "tolerance", "µs", "work", "unsolved", "error %"))
+    for row, following in itertools.zip_longest(rows, rows[1:]):
+        table.add_row(
+            f"{row.subject}, {row.law}",
+            f"{1e3 * row.h:g}",
+            f"{row.tolerance:g}",
+            f"{1e6 * row.seconds:.1f}",
+            f"{row.evaluations:.1f} + {row.derivatives:.1f}",
+            f"{row.unsolved}",
+            _percent(row.error),
+            end_section=following is None or (following.subject, following.h) != (row.subject, row.h),
         )
     return table
 

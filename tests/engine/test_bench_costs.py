@@ -1,6 +1,7 @@
 """The studies of cost: what they measure is right, whatever the machine's speed."""
 
 import copy
+import json
 import math
 
 import mujoco
@@ -8,11 +9,12 @@ import numpy as np
 import pytest
 
 import rftsim
-from rftsim.bench import environment, others, pareto
+from rftsim.bench import environment, others, pareto, paths, quadruped, tolerances
 from rftsim.bench.cases import OWN, draw_controls
 from rftsim.bench.environment_picture import plot_environment
 from rftsim.bench.pareto import Compared, Tried
 from rftsim.bench.pareto_picture import plot_pareto
+from rftsim.cli.costs import compare_speeds
 
 
 def tried(cost, error, h=1e-3):
@@ -41,6 +43,43 @@ def test_a_shorter_step_is_nearer_to_the_reference(runner, tmp_path):
     assert (tmp_path / "pareto.png").stat().st_size > 10_000
 
 
+def test_a_finer_tolerance_costs_evaluations(tmp_path, capsys):
+    """Every subject has a row for every tolerance; a finer one evaluates the force as often or more."""
+    compare_speeds(("tolerance",), quick=True, memory=tmp_path, plot=tmp_path, json=True)
+    printed = json.loads(capsys.readouterr().out)
+    rows = [tolerances.Solved(**row) for row in printed["tolerance"]]
+    ways = [(name, 5e-3, tolerance) for name in tolerances.SOLVED for tolerance in tolerances.QUICK]
+    assert [(row.subject, row.h, row.tolerance) for row in rows] == ways
+    assert all(0.0 < row.error < 0.2 and row.seconds > 0.0 for row in rows)
+    for name in tolerances.SOLVED:
+        evaluations = [row.evaluations for row in rows if row.subject == name]
+        assert evaluations == sorted(evaluations, reverse=True)
+        assert evaluations[-1] >= 1.0
+    assert printed["advice"]["common"] in tolerances.QUICK
+    assert (tmp_path / "tolerance.png").stat().st_size > 10_000
+    again = pareto.Study(tmp_path / "pareto.json", quick=True)
+    assert pareto.run_tolerances(again, tolerances.SOLVED, lambda _: None) == rows
+
+
+def solved(subject, tolerance, seconds, error):
+    return tolerances.Solved(subject, "rft3d", 5e-3, tolerance, seconds, 1.0, 0.0, 0, error)
+
+
+def test_the_cheapest_tolerance_that_errs_little_is_recommended():
+    """Each subject has its own, all together the cheapest that serves each; one that is lost has none."""
+    coarse = [solved("a", 1e-1, 1.0, 0.3), solved("b", 1e-1, 1.0, 0.1)]
+    rows = [solved("a", 1e-4, 4.0, 0.1), solved("a", 1e-2, 2.0, 0.14), solved("b", 1e-4, 2.0, 0.1)]
+    rows += [solved("b", 1e-2, 1.5, 0.1), *coarse]
+    assert tolerances.advise(rows) == (5e-3, 1e-4, {"a": 1e-2, "b": 1e-1}, 1e-2)
+    assert tolerances.advise([solved("a", 1e-4, 4.0, math.inf), *coarse[:1]]) is None
+
+
+def test_parts_of_pareto_are_chosen_by_name(tmp_path):
+    """A part that is not there is said, before anything is measured."""
+    with pytest.raises(rftsim.RftsimError, match="no part 'wheel'; --cases takes laws, tolerance"):
+        compare_speeds(("wheel",), quick=True, memory=tmp_path, plot=None, json=True)
+
+
 def test_the_step_with_sand_over_the_one_without(tmp_path):
     """Each evaluation of the force costs time; the batch's simulations have sand of their own and lose no step."""
     pytest.importorskip("mujoco.batch")
@@ -67,6 +106,15 @@ def test_the_quadruped_trots():
     assert data.qpos[0] > begun.qpos[0] + 0.1
     assert data.qpos[2] > 0.2
     assert rftsim.work(data.model, data).unsolved <= 1
+
+
+def test_the_quadruped_is_followed_as_it_is_timed():
+    """A path of it takes the controls that the study of the environment takes, whatever the time step."""
+    begun = quadruped.trotting()
+    spans = OWN["quadruped", "rft3d"].move(begun, 60)
+    for k in range(30):
+        held = quadruped.QUADRUPED.move(begun.model, k * paths.SAMPLE)
+        assert np.allclose(held, spans[k // 2].ctrl, atol=1e-9)
 
 
 def test_spheres_lie_in_the_sand():
