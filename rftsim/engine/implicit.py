@@ -193,13 +193,13 @@ def _fill_dofs(model, data, m, d, old, i, island, p):
         dof = dofs[first + k]
         equation.velocity(p)[k], equation.lacking(p)[k] = velocity[dof], lacking[dof]
         equation.lightness(p)[k], equation.smooth_force(p)[k] = light[dof], smooth[dof]
-    numbers = int32s(pointer(m + model.M_rownnz), nv), int32s(pointer(m + model.M_rowadr), nv)
-    last = numbers[0][nv - 1] + numbers[1][nv - 1]
-    _couple(numbers[0], numbers[1], int32s(pointer(m + model.M_colind), last), i, island, p)
+    number, start = int32s(pointer(m + model.M_rownnz), nv), int32s(pointer(m + model.M_rowadr), nv)
+    total = start[nv - 1] + number[nv - 1]
+    _couple(number, start, int32s(pointer(m + model.M_colind), total), i, island, p)
     if int32s(m + model.opt_integrator, 1)[0] != _EULER:
-        drags = int32s(pointer(m + model.D_rownnz), nv), int32s(pointer(m + model.D_rowadr), nv)
-        last = drags[0][nv - 1] + drags[1][nv - 1]
-        _couple(drags[0], drags[1], int32s(pointer(m + model.D_colind), last), i, island, p)
+        number, start = int32s(pointer(m + model.D_rownnz), nv), int32s(pointer(m + model.D_rowadr), nv)
+        total = start[nv - 1] + number[nv - 1]
+        _couple(number, start, int32s(pointer(m + model.D_colind), total), i, island, p)
     sparse.close(p)
     _fill_mass(model, data, m, d, i, island, p)
     _fill_drag(model, data, m, d, i, island, p)

@@ -219,13 +219,13 @@ def test_the_solution_of_the_implicit_force(capsys, tmp_path, monkeypatch):
         beds.append(instances(scenes.stage(scene, **options).model)[0].bed)
         raise RftsimError("seen")
 
-    asked = "--tolerance", 1e-4, "--iterations", 40
+    asked = "--tolerance", 1e-4, "--iterations", 30
     told = json.loads(call(capsys, "inspect", path, "--json", *asked)[1])
-    assert (told["tolerance"], told["iterations"]) == (1e-4, 40)
-    assert "solved to 0.0001 of a body's velocity, in 40 iterations" in call(capsys, "inspect", path, *asked)[1]
+    assert (told["tolerance"], told["iterations"]) == (1e-4, 30)
+    assert "solved to 0.0001 of a body's velocity, in 30 iterations" in call(capsys, "inspect", path, *asked)[1]
     monkeypatch.setattr("rftsim.cli.scene.stage", staged)
     for scene, command in itertools.product((path, "intruder"), ("run", "drop", "view", "inspect")):
-        for more, expected in ((), (3e-3, 20)), (asked, (1e-4, 40)):
+        for more, expected in ((), (3e-3, 40)), (asked, (1e-4, 30)):
             assert "seen" in call(capsys, command, scene, *more)[2]
             assert (beds[-1].tolerance, beds[-1].iterations) == expected
 

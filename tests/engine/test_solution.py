@@ -19,7 +19,7 @@ def carried(model):
 
 
 def test_defaults():
-    assert carried(sandy(LEG, force="implicit")) == (layout.TOLERANCE, layout.ITERATIONS) == (3e-3, 20)
+    assert carried(sandy(LEG, force="implicit")) == (layout.TOLERANCE, layout.ITERATIONS) == (3e-3, 40)
 
 
 def test_options_reach_the_bed():
