@@ -19,6 +19,8 @@ MOST_PARTS: Final = (24.0, 1.0)
 """Parts of a step; where those did work, it is taken whole."""
 UNSOLVED_PARTS: Final = 4.0
 """Parts at least of a step that was not solved as a whole."""
+HUGE: Final = 1e9
+"""Size from which on a force [N] or a velocity [m/s] is not taken for one."""
 GAIN: Final = 1e-7
 """Work that the sand may do in a step over the kinetic energy: rounding, not physics, and more is taken back."""
 
@@ -41,6 +43,27 @@ def step(p):
         _forget(p)
     if work > slack:
         _take_back(p, slack, work)
+    if not _is_finite(p):
+        _let_go(p)
+
+
+@exact
+def _is_finite(p):
+    """Whether the force, and the velocity that it leads to, are numbers of a size that a step can have."""
+    q, after, found = equation.out(p), equation.after(p), True
+    for k in range(q.size):
+        found = found and abs(q[k]) < HUGE and abs(after[k]) < HUGE
+    return found
+
+
+@exact
+def _let_go(p):
+    """Give the step no force of the sand, where its solution came to no number."""
+    _forget(p)
+    linear_algebra.clear(equation.out(p))
+    linear_algebra.clear(equation.after(p))
+    linear_algebra.clear(equation.all_wrenches(p))
+    equation.work(p).unsolved += 1.0
 
 
 @exact
@@ -49,7 +72,7 @@ def _forget(p):
     equation.numbers(p).drift, equation.numbers(p).started = 0.0, 1.0
     linear_algebra.clear(equation.lacking(p))
     for b in range(equation.head(p).nbody):
-        equation.kept(p, b).known = 0.0
+        equation.kept(p, b).known = equation.kept(p, b).drift = equation.kept(p, b).parts = 0.0
     linear_algebra.copy(equation.first_frames(p), equation.frames(p))
 
 
