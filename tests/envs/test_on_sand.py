@@ -70,7 +70,8 @@ def test_the_contract_of_all_is_gymnasiums():
 
 
 def test_the_sand_carries_an_ant_that_stands():
-    env = rftsim_envs.on_sand("Ant-v5", reset_noise_scale=0.0)
+    """At a tolerance of 1e-3 it stays where it stands; at the default it settles a moment longer, 0.2 mm on its way."""
+    env = rftsim_envs.on_sand("Ant-v5", reset_noise_scale=0.0, tolerance=1e-3)
     env.reset(seed=0)
     model, data = env.unwrapped.model, env.unwrapped.data
     while data.time < 3.0:
@@ -81,7 +82,7 @@ def test_the_sand_carries_an_ant_that_stands():
     weight = model.body_mass.sum() * 9.81
     assert rftsim.wrenches(model, data).force.sum(0)[2] == pytest.approx(weight, rel=0.01)
     assert data.ncon == 0
-    assert np.linalg.norm(data.qpos[:2] - start) < 2e-4
+    assert np.linalg.norm(data.qpos[:2] - start) < 1e-5
     assert np.abs(data.qvel).max() < 1e-5
     assert info["reward_survive"] == 1.0
 
