@@ -6,7 +6,7 @@ from rftsim.engine import external, islands
 from rftsim.engine.layout import CONSTANTS
 from rftsim.machine.compiling import exact, inline
 from rftsim.machine.memory import doubles, int32s, matrix, pointer
-from rftsim.solver import equation, sparse
+from rftsim.solver import constraint_rows, equation, sparse
 from rftsim.solver.equation import KIND
 
 _K: Final = 0
@@ -143,9 +143,7 @@ def fill_rows(model, data, contact, m, d, i, island, p):
         _fill_law(data, contact, d, p, row, at, inside)
     at = 0
     while at < n:
-        last = at + 1
-        while last < n and equation.row_kind(p)[last] == KIND.tangent:
-            last += 1
+        last = constraint_rows.last_of_cone(equation.row_kind(p), at)
         if last > at + 1:
             _join_cone(p, at, last)
         for row in range(at, last):

@@ -135,6 +135,6 @@ def _correct(p):
 def _filter(p, impulse, out):
     """Fill out with A^-1 M A^-1 impulse, A the matrix that the linearised equation left factored."""
     between = equation.solved(p)
-    linearised.substitute(p, impulse, out)
+    linearised.substitute(p, impulse, equation.seen(p), out)
     sparse.multiply(p, equation.mass(p), out, between)
-    linearised.substitute(p, between, out)
+    linearised.substitute(p, between, equation.seen(p), out)

@@ -70,13 +70,13 @@ def _factor(p, x, force):
 
 
 @exact
-def substitute(p, impulse, out):
-    """Fill out with the velocity change by an impulse, by the matrix that was factored last."""
-    if not is_indirect(p):
-        sparse.substitute(p, equation.linear_factors(p), impulse, out)
-        return
-    seen, slowed = equation.seen(p), equation.slowed(p)
+def substitute(p, impulse, seen, out):
+    """Fill out with the velocity change by an impulse, by the last factors, and seen with the one that rows see."""
+    slowed = equation.slowed(p)
     sparse.substitute(p, equation.linear_factors(p), impulse, seen)
+    if not is_indirect(p):
+        linear_algebra.copy(seen, out)
+        return
     sparse.multiply(p, equation.plain_mass(p), seen, slowed)
     sparse.substitute(p, equation.mass_factors(p), slowed, out)
 
@@ -150,15 +150,10 @@ def _solve_with_rows(p, v, residual, which, out):
 @exact
 def _fill_direction(p):
     """Fill `direction`, as the rows see it, with a step that makes up for the missing impulse; and `taken` by it."""
-    direction, taken, slowed = equation.direction(p), equation.taken(p), equation.slowed(p)
-    sparse.substitute(p, equation.linear_factors(p), equation.missing(p), direction)
+    direction, taken = equation.direction(p), equation.taken(p)
+    substitute(p, equation.missing(p), direction, taken)
     for k in range(direction.size):
-        direction[k] = -direction[k]
-    if is_indirect(p):
-        sparse.multiply(p, equation.plain_mass(p), direction, slowed)
-        sparse.substitute(p, equation.mass_factors(p), slowed, taken)
-    else:
-        linear_algebra.copy(direction, taken)
+        direction[k], taken[k] = -direction[k], -taken[k]
 
 
 @exact
