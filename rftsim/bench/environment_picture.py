@@ -17,7 +17,7 @@ def plot_environment(rows: list[Timed], path: Path) -> None:
     """Draw what sand costs: the step over the one without sand, and the throughput of batches over it."""
     cases = list(dict.fromkeys((row.subject, row.law) for row in rows))
     batched = list(dict.fromkeys((row.subject, row.law) for row in rows if row.batch))
-    figure = make_figure((4.0 + 0.6 * (len(cases) + len(batched)), 4.5))
+    figure = make_figure((max(4.0 + 0.6 * (len(cases) + len(batched)), 8.0), 4.5))
     widths = [max(len(cases), 2), max(len(batched), 2)]
     left, right = figure.subplots(1, 2, gridspec_kw={"width_ratios": widths})
     for k, (force, colour) in enumerate(COLOURS.items()):
@@ -36,11 +36,12 @@ def plot_environment(rows: list[Timed], path: Path) -> None:
     ticks = [1, 2, 3, 5, 10, 20, 30, 100, 300, 1000]
     left.set_yticks(ticks, [f"{tick}" for tick in ticks])
     left.set_ylabel("step, over that without sand")
-    right.set_ylabel(f"throughput of {SIMULATIONS}, over that without sand")
+    left.set_ylim(0.7, 1.5 * max(limit for limit in (*LIMITS.values(), *(row.ratio for row in rows)) if limit < np.inf))
+    right.set_ylabel(f"throughput of {SIMULATIONS}, likewise")
     for axis, names in ((left, cases), (right, batched)):
         axis.set_xticks(np.arange(len(names)), [f"{name}\n{law}" for name, law in names], rotation=90)
         axis.grid(alpha=0.3, axis="y")
-    left.legend(loc="upper left")
+    left.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, fontsize="small")
     right.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, fontsize="small")
     figure.suptitle("What sand adds to MuJoCo's step (dashed: what the wheel was asked to keep)")
     save_figure(figure, path)
