@@ -26,14 +26,15 @@ NUMBERS: Final = np.dtype(
         (name, "f8")
         for name in (
             *("timestep", "h", "started", "dragged", "tolerance", "iterations"),
-            *("scale", "v_c", "solved", "drift", "parts"),
+            *("scale", "v_c", "solved", "drift", "parts", "is_linearised", "is_factored"),
         )
     ]
 )
 """MuJoCo's time step [s]; that of the equation [s]; whether a step was made before; whether the integrator takes drag
 implicitly; tolerance and most iterations; size of the impulses but the sand's and the rows'; speed below which a
 triangle's stress falls to zero [m/s]; whether the equation was solved; length of the last part of a split step [s];
-parts that are needed."""
+parts that are needed; whether `linear` is that of the derivatives as they are, and `linear_factors` are its factors
+with the rows that act as noted."""
 SCORES: Final = np.dtype([("missing", "f8"), ("scale", "f8"), ("error", "f8")])
 """Scores of a tried velocity: size of the missing impulse, size of all impulses, and error of the bodies' speeds over
 what is allowed, were there no stiffness."""

@@ -2,9 +2,10 @@
 
 from typing import Final
 
+from rftsim.law.layout import WRENCH
 from rftsim.law.stress import TINY
-from rftsim.machine.compiling import exact
-from rftsim.machine.memory import doubles, stack_doubles
+from rftsim.machine.compiling import exact, fast
+from rftsim.machine.memory import doubles, peek, poke, stack_doubles
 from rftsim.solver import constraint_rows, equation, linear_algebra, sparse
 
 NONE: Final = 0
@@ -13,7 +14,7 @@ COMPLETED: Final = 2
 """Which derivative of the sand's force the linearised equation takes."""
 ITERATIONS: Final = 20
 """Steps of Newton's method on the rows, and trials of one step's length, at most."""
-EXACTNESS: Final = (1e-16, 1e-6, 1e-6)
+EXACTNESS: Final = (1e-16, 1e-4, 1e-4)
 """Square of the share of the missing impulse that may be left, by which derivative is taken."""
 
 
@@ -25,28 +26,46 @@ def _derivative(p, which, b):
 
 
 @exact
+def _is_zero(g):
+    """Whether a derivative is zero: that of a body above the sand."""
+    for i in range(WRENCH):
+        for k in range(WRENCH):
+            if g[i, k] != 0.0:
+                return False
+    return True
+
+
+@fast
 def _add_derivative(p, b, g, a):
     """Add -h J' G J to a matrix, G the derivative of body b's wrench by its twist."""
-    path, n, h = equation.path(p, b), equation.path_length(p)[b], equation.numbers(p).h
-    wrench = doubles(stack_doubles(6), 6)
+    path, n, h, ndof = equation.path(p, b), equation.path_length(p)[b], equation.numbers(p).h, a.shape[0]
+    out, wrench = doubles(a.ctypes.data, a.size), doubles(stack_doubles(6), 6)
     for k in range(n):
-        linear_algebra.multiply(g, equation.motion(p, b, k), wrench)
+        m = equation.motion(p, b, k)
         for r in range(6):
-            wrench[r] *= -h
+            along = g[r, 0] * m[0] + g[r, 1] * m[1] + g[r, 2] * m[2]
+            wrench[r] = -h * (along + g[r, 3] * m[3] + g[r, 4] * m[4] + g[r, 5] * m[5])
+        x, y, z, u, v, w = wrench[0], wrench[1], wrench[2], wrench[3], wrench[4], wrench[5]
         for i in range(n):
-            a[path[i], path[k]] += linear_algebra.dot(equation.motion(p, b, i), wrench)
+            j, at = equation.motion(p, b, i), ndof * peek(path, i) + peek(path, k)
+            power = j[0] * x + j[1] * y + j[2] * z + j[3] * u + j[4] * v + j[5] * w
+            poke(out, at, peek(out, at) + power)
 
 
 @exact
 def _linearise(p, which):
-    """Fill `equation.linear` with M - h J' G J, G the sand's derivatives; with M for NONE."""
-    a = equation.linear(p)
+    """Fill `equation.linear` with M - h J' G J, G the sand's derivatives, unless it is that; with M for NONE."""
+    a, numbers = equation.linear(p), equation.numbers(p)
+    if which == EXACT and numbers.is_linearised > 0.0:
+        return
+    numbers.is_linearised, numbers.is_factored = 1.0 if which == EXACT else 0.0, 0.0
     sparse.copy(p, equation.mass(p), a)
     if which == NONE:
         return
     for b in range(equation.head(p).nbody):
-        if which == COMPLETED or equation.kept(p, b).known > 0.0:
-            _add_derivative(p, b, _derivative(p, which, b), a)
+        g = _derivative(p, which, b)
+        if (which == COMPLETED or equation.kept(p, b).known > 0.0) and not _is_zero(g):
+            _add_derivative(p, b, g, a)
 
 
 @exact
@@ -67,6 +86,7 @@ def _factor(p, x, force):
         sparse.add_difference(p, linear, equation.mass(p), share, a)
         constraint_rows.add_stiffness(p, x, force, a)
     sparse.factor(p, a)
+    equation.numbers(p).is_factored = 1.0
 
 
 @exact
@@ -95,7 +115,8 @@ def solution(p, v, residual, which, out):
         _solve_with_rows(p, v, residual, which, out)
         return
     direction, nothing = equation.direction(p), equation.missing(p)
-    _factor(p, nothing, nothing)
+    if equation.numbers(p).is_factored == 0.0:
+        _factor(p, nothing, nothing)
     sparse.substitute(p, equation.linear_factors(p), residual, direction)
     for k in range(v.size):
         out[k] = v[k] - direction[k]
@@ -123,12 +144,11 @@ def _solve_with_rows(p, v, residual, which, out):
     h = equation.numbers(p).h
     x, force, moved = equation.row_error(p), equation.row_force(p), equation.row_moved(p)
     change, fixed, missing = equation.change(p), equation.fixed(p), equation.missing(p)
-    direction, taken, first = equation.direction(p), equation.taken(p), True
+    direction, taken, numbers = equation.direction(p), equation.taken(p), equation.numbers(p)
     target = EXACTNESS[which] * (linear_algebra.dot(residual, residual) + TINY)
     for _ in range(ITERATIONS):
-        if constraint_rows.note_zones(p, x) or first:
+        if constraint_rows.note_zones(p, x) or numbers.is_factored == 0.0:
             _factor(p, x, force)
-        first = False
         _fill_direction(p)
         sparse.multiply(p, equation.linear(p), taken, change)
         stiff, slope = linear_algebra.dot(direction, change), linear_algebra.dot(direction, fixed)

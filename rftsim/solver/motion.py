@@ -7,7 +7,7 @@ import numpy as np
 
 from rftsim.law import exports, step_frame
 from rftsim.machine.compiling import exact, fast
-from rftsim.machine.memory import doubles, stack_doubles
+from rftsim.machine.memory import doubles, peek, poke, stack_doubles
 from rftsim.solver import equation, linear_algebra
 
 
@@ -16,7 +16,7 @@ def twist_of(p, b, v, out):
     """Fill out with the twist of body b at a generalised velocity, (6,)."""
     path, a, c, d, e, f, g = equation.path(p, b), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for k in range(equation.path_length(p)[b]):
-        y, j = v[path[k]], equation.motion(p, b, k)
+        y, j = peek(v, peek(path, k)), equation.motion(p, b, k)
         a, c, d = a + j[0] * y, c + j[1] * y, d + j[2] * y
         e, f, g = e + j[3] * y, f + j[4] * y, g + j[5] * y
     out[0], out[1], out[2], out[3], out[4], out[5] = a, c, d, e, f, g
@@ -48,8 +48,11 @@ def frame_at(p, b, twist):
 def add_wrench(p, b, wrench, share, out):
     """Add a share of a wrench on body b to a generalised force."""
     path = equation.path(p, b)
+    a, c, d, e, f, g = wrench[0], wrench[1], wrench[2], wrench[3], wrench[4], wrench[5]
     for k in range(equation.path_length(p)[b]):
-        out[path[k]] += share * linear_algebra.dot(equation.motion(p, b, k), wrench)
+        dof, j = peek(path, k), equation.motion(p, b, k)
+        power = a * j[0] + c * j[1] + d * j[2] + e * j[3] + f * j[4] + g * j[5]
+        poke(out, dof, peek(out, dof) + share * power)
 
 
 @exact
@@ -84,5 +87,6 @@ def differentiate(p, b, twist, completed):
     sand, numbers, f, r = equation.head(p).sand, equation.numbers(p), equation.frame(p, b), equation.rotation(p, b)
     fixed = equation.surface(p)[b], f.ctypes.data, r.ctypes.data
     g = equation.completed(p, b).ctypes.data if completed > 0.0 else equation.derivative(p, b).ctypes.data
+    numbers.is_linearised = 0.0
     exports.derivative(sand, *fixed, twist.ctypes.data, numbers.v_c, completed, g)
     equation.work(p).derivatives += 1.0 / equation.head(p).nbody

@@ -8,7 +8,7 @@ from rftsim.solver import equation, linear_algebra, linearised, residual, sparse
 def prepare(p, h):
     """Set the equation's mass and its factors, and its step, for a time h."""
     numbers, mass, factors = equation.numbers(p), equation.mass(p), equation.mass_factors(p)
-    numbers.h = h
+    numbers.h, numbers.is_linearised = h, 0.0
     sparse.copy(p, equation.plain_mass(p), mass)
     if numbers.dragged > 0.0:
         sparse.add(p, equation.drag(p), h, mass)
