@@ -47,6 +47,8 @@ CREEP: Final = 1e-4
 hardest of all to solve for, and is so less often."""
 FORCE: Final = 2.0
 """Missing impulse that is allowed, over all impulses and the tolerance."""
+MOST_FORCE: Final = 6e-3
+"""The same over all impulses at most: what holds a plate on its way edge-on jumps within a hundredth of its speed."""
 PATIENCE: Final = 6.0
 """Iterations after which the tolerance is loosened."""
 LOOSEST: Final = 20.0
@@ -132,7 +134,7 @@ def _is_short(p):
         return False
     if now.error <= 1.0:
         return True
-    left, there, force = progress.contraction, equation.there(p), FORCE * numbers.tolerance
+    left, there, force = progress.contraction, equation.there(p), min(FORCE * numbers.tolerance, MOST_FORCE)
     for k in range(there.size):
         there[k] = equation.velocity_of(p, POINT.now)[k] + equation.search(p)[k]
     for b in range(equation.head(p).nbody):
