@@ -8,7 +8,8 @@ import numpy as np
 from rftsim.errors import SceneError, SurfaceError
 from rftsim.model.draft import TEMPORARY
 from rftsim.surface import solids
-from rftsim.surface.triangles import EDGE_ON_SINGLE, Array, Faces, Surface, is_closed, make_surface
+from rftsim.surface.topology import Array, Faces, is_closed
+from rftsim.surface.triangles import EDGE_ON_SINGLE, Surface, make_surface
 
 Meshes = Literal["hull", "exact"]
 """How the meshes of geoms are felt: as the convex hulls that MuJoCo collides with, or as they are where closed."""
