@@ -1,12 +1,12 @@
 """The shells of a mesh: wound outward, and united, so that only what meets the sand is left."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rftsim.errors import SurfaceError
-from rftsim.surface.topology import Array, Faces, Indices, is_closed, shells
+from rftsim.surface.topology import Array, Faces, Indices, is_closed, shells, volumes
 from rftsim.surface.union import APART, area, groups, shown
 
 Flags = NDArray[np.bool_]
@@ -48,7 +48,7 @@ def outer(points: Array, faces: Faces, turned: Flags, name: str) -> tuple[Array,
         name: Name of the mesh in messages.
     """
     label, places, corners = shells(points, faces)
-    inward = (_volumes(places[corners], label) < 0.0)[label]
+    inward = (volumes(places[corners], label) < 0.0)[label]
     corners[inward] = corners[inward][:, ::-1]
     left = _left(places, corners, label)
     hidden = np.array([triangles is None for triangles in left.triangles])[label]
@@ -93,14 +93,6 @@ def _alone(places: Array, faces: Faces) -> tuple[Array, Faces]:
     """The vertices that some faces have, and the faces on them."""
     used, own = np.unique(faces, return_inverse=True)
     return places[used], own.reshape(-1, 3)
-
-
-def _volumes(triangles: Array, label: Indices) -> Any:
-    """Volume within each shell [m^3], about the mean of its corners where it is open, shape (nshell,)."""
-    count = np.bincount(label)
-    middle = np.stack([np.bincount(label, triangles[:, :, k].mean(axis=1)) / count for k in range(3)], axis=1)
-    a, b, c = np.moveaxis(triangles - middle[label][:, None], 1, 0)
-    return np.bincount(label, np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0)
 
 
 def _cyclic(faces: Faces) -> Faces:

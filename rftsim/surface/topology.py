@@ -1,6 +1,7 @@
 """How the faces of a mesh hang together: welded vertices, edges that faces share, closed shells."""
 
-from typing import Any
+from collections.abc import Callable, Iterator
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,6 +9,9 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Faces = NDArray[np.integer[Any]]
 Indices = NDArray[np.intp]
+
+NEAR: Final = 1e-6
+"""Angle between faces that lie on one another, by rounding [rad]."""
 
 
 def welded(points: Array, faces: Faces) -> tuple[Array, Faces]:
@@ -30,25 +34,25 @@ def distinct(rows: Faces) -> tuple[Indices, Indices]:
 def needed(faces: Faces) -> NDArray[np.bool_]:
     """Which faces are needed where some are there several times, either way round, shape (nface,).
 
-    Each counts once, but that two closed shells which share a face need it twice: where an edge would have an odd
-    number of faces, a second one is kept, if that closes the mesh.
+    Each counts once, if the mesh is closed then. If not, closed shells share faces: two that look opposite ways part
+    shells that touch, and neither is needed; two that look the same way are both.
     """
     first, same = distinct(np.sort(faces, axis=1))
     once = np.zeros(len(faces), dtype=bool)
     once[first] = True
-    if once.all():
+    if once.all() or is_closed(faces[once]):
         return once
-    second = np.zeros(len(faces), dtype=bool)
-    rest = np.flatnonzero(~once)
-    second[rest[np.unique(same[rest], return_index=True)[1]]] = True
-    edge = _edges(faces).reshape(-1, 3)
-    keep = once.copy()
-    while True:
-        odd = np.bincount(edge[keep].ravel(), minlength=int(edge.max()) + 1) % 2 == 1
-        more = second & ~keep & odd[edge].any(axis=1)
-        if not more.any():
-            return keep if not odd.any() else once
-        keep |= more
+    ascending = (faces[:, 0] < faces[:, 1]).astype(int) + (faces[:, 1] < faces[:, 2]) + (faces[:, 2] < faces[:, 0])
+    sign = np.where(ascending == 2, 1, -1)
+    net = np.bincount(same, sign).astype(int)
+    order = np.lexsort((np.arange(len(faces)), sign, same))
+    start = np.searchsorted(same[order], np.arange(len(first)))
+    rank = np.empty(len(faces), dtype=int)
+    rank[order] = np.arange(len(faces)) - start[same[order]]
+    negative = np.bincount(same, sign < 0).astype(int)
+    own = np.where(sign < 0, rank, rank - negative[same])
+    kept: NDArray[np.bool_] = (sign == np.sign(net)[same]) & (own < np.abs(net)[same])
+    return kept if kept.any() and is_closed(faces[kept]) else once
 
 
 def open_face(faces: Faces) -> int | None:
@@ -112,41 +116,112 @@ def _mates(points: Array, faces: Faces) -> Indices:
     one, other = order[plain], order[plain + 1]
     opposite = tail[one] == head[other]
     mate[one[opposite]], mate[other[opposite]] = other[opposite], one[opposite]
-    shared = np.flatnonzero(count > 2)
-    if shared.size:
+    shared = [order[starts[number] : starts[number] + count[number]] for number in np.flatnonzero(count > 2)]
+    if shared:
         half = np.flatnonzero(mate >= 0)
         patch = _components(len(faces), half // 3, mate[half] // 3)
-        for number in shared:
-            own = order[starts[number] : starts[number] + count[number]]
-            _pair(points, faces, own[tail[own] < head[own]], own[tail[own] > head[own]], patch, mate)
+        fans = [_Fan.of(points[faces], own, tail[own] < head[own]) for own in shared]
+        sense = _senses(points[faces], patch)
+        for one, other in _paired(fans, patch, sense):
+            mate[one], mate[other] = other, one
     return mate
 
 
-def _pair(points: Array, faces: Faces, forward: Indices, backward: Indices, patch: Indices, mate: Indices) -> None:
-    """Pair the directed edges along one edge with those against it; fills their mates."""
-    left, right = list(forward), list(backward)
-    for one in forward:
-        near = [other for other in right if patch[other // 3] == patch[one // 3]]
-        if len(near) == 1 and np.count_nonzero(patch[forward // 3] == patch[one // 3]) == 1:
-            left.remove(one)
-            right.remove(near[0])
-            mate[one], mate[near[0]] = near[0], one
-    if not (left and right):
-        return
-    start, end = points[faces[left[0] // 3, left[0] % 3]], points[faces[left[0] // 3, (left[0] + 1) % 3]]
-    along = (end - start) / np.linalg.norm(end - start)
-    angle = {half: _turn(points[faces[half // 3, (half + 2) % 3]] - start, along) for half in (*left, *right)}
-    for one in left:
-        if right:  # the solid lies behind a face: turn from a face that runs forward against the right hand
-            nearest = min(right, key=lambda other: (angle[one] - angle[other] - 1e-9) % (2.0 * np.pi))
-            right.remove(nearest)
-            mate[one], mate[nearest] = nearest, one
+def _senses(triangles: Array, patch: Indices) -> Indices:
+    """Whether the faces of each patch look outward (1), inward (-1), or may do either, as flat ones do (0)."""
+    size = np.ptp(triangles, axis=(0, 1)).max()
+    volume = volumes(triangles, patch)
+    looks: Indices = np.sign(volume).astype(int) * (np.abs(volume) > 1e-12 * size**3)
+    return looks
 
 
-def _turn(arm: Array, along: Array) -> float:
-    """The angle about an edge at which a face beside it lies, whose third corner is at the end of an arm [rad]."""
-    first = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
-    return float(np.arctan2(arm @ np.cross(along, first), arm @ first))
+class _Fan(NamedTuple):
+    """The directed edges of faces around an edge that more than two share."""
+
+    forward: list[int]
+    """Those of one direction, which are to be paired."""
+    backward: list[int]
+    """Those against it."""
+    angle: dict[int, float]
+    """The angle about the edge at which the face of each lies [rad]."""
+
+    @classmethod
+    def of(cls, triangles: Array, halves: Indices, is_forward: NDArray[np.bool_]) -> "_Fan":
+        """The fan of directed edges, (n,), of which some run forward, (n,)."""
+        face, corner = halves // 3, halves % 3
+        ends = triangles[face, corner], triangles[face, (corner + 1) % 3]
+        along = (ends[1] - ends[0])[0] * (1.0 if is_forward[0] else -1.0)
+        arm = triangles[face, (corner + 2) % 3] - ends[0]
+        first = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
+        angle = np.arctan2(arm @ np.cross(along, first) / np.linalg.norm(along), arm @ first)
+        return cls(
+            halves[is_forward].tolist(),
+            halves[~is_forward].tolist(),
+            dict(zip(halves.tolist(), angle.tolist(), strict=True)),
+        )
+
+    def choice(self, part: Callable[[int], tuple[int, int]]) -> tuple[int, int, bool]:
+        """The likeliest pair, and whether it is sure: of one part, or with no rival at the same angle.
+
+        Args:
+            part: The part that a directed edge is known to belong to, and whether its faces look outward (1), inward
+                (-1), or may do either (0).
+        """
+        found = []
+        for one in self.forward:
+            for other in self.backward:
+                (own, sense), (its, other_sense) = part(one), part(other)
+                turn = (sense or other_sense or 1) * (self.angle[one] - self.angle[other])  # the solid lies behind both
+                found.append((own != its, (turn - NEAR) % (2.0 * np.pi), one, other))
+        found.sort()
+        _, least, one, other = found[0]
+        rivals = (abs(angle - least) < 2.0 * NEAR and (a == one) != (b == other) for _, angle, a, b in found)
+        return one, other, not found[0][0] or not any(rivals)
+
+
+def _paired(fans: list[_Fan], patch: Indices, sense: Indices) -> Iterator[tuple[int, int]]:
+    """Pairs of directed edges that belong to one shell; what is not sure waits until other edges have told.
+
+    Args:
+        fans: Edges with more than two faces; emptied.
+        patch: What faces hang together by other edges, shape (nface,).
+        sense: Whether the faces of each patch look outward, inward, or may do either (1, -1, 0).
+    """
+    leader, looks = list(range(len(sense))), sense.tolist()
+
+    def part(half: int) -> tuple[int, int]:
+        number = int(patch[half // 3])
+        while leader[number] != number:
+            leader[number] = leader[leader[number]]
+            number = leader[number]
+        return number, looks[number]
+
+    waiting = fans
+    while waiting:
+        later, must = [], True
+        for fan in waiting:
+            while fan.forward and fan.backward:
+                one, other, sure = fan.choice(part)
+                if not sure and not (must and fan is waiting[-1]):
+                    break
+                must = False
+                fan.forward.remove(one)
+                fan.backward.remove(other)
+                (own, sign), (its, other_sign) = part(one), part(other)
+                leader[own], looks[its] = its, other_sign or sign
+                yield one, other
+            if fan.forward and fan.backward:
+                later.append(fan)
+        waiting = later
+
+
+def volumes(triangles: Array, label: Indices) -> Array:
+    """Volume within each shell [m^3], about the mean of its faces where it is open, shape (nshell,)."""
+    count = np.bincount(label)
+    middle = np.stack([np.bincount(label, triangles[:, :, k].mean(axis=1)) / count for k in range(3)], axis=1)
+    a, b, c = np.moveaxis(triangles - middle[label][:, None], 1, 0)
+    found: Array = np.bincount(label, np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0)
+    return found
 
 
 def _components(count: int, one: Indices, other: Indices) -> Indices:
