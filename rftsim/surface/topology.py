@@ -220,8 +220,8 @@ def volumes(triangles: Array, label: Indices) -> Array:
     count = np.bincount(label)
     middle = np.stack([np.bincount(label, triangles[:, :, k].mean(axis=1)) / count for k in range(3)], axis=1)
     a, b, c = np.moveaxis(triangles - middle[label][:, None], 1, 0)
-    found: Array = np.bincount(label, np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0)
-    return found
+    parts: Array = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0
+    return np.bincount(label, parts).astype(float)
 
 
 def _components(count: int, one: Indices, other: Indices) -> Indices:
