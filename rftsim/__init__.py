@@ -3,13 +3,14 @@
 from rftsim.engine import plugin as _plugin
 from rftsim.errors import RftsimError, RftsimNote, RftsimWarning, SandError, SceneError, SurfaceError
 from rftsim.law.laws import LAWS, Law
-from rftsim.law.rigid import SurfaceForce, surface_force
+from rftsim.law.rigid import Intruder, SurfaceForce, Wrench, surface_force
 from rftsim.model.add_sand import Bed, add_sand, load
 from rftsim.model.reactions import rne_post_constraint
 from rftsim.model.readout import Instance, Tractions, Work, Wrenches, instances, tractions, work, wrenches
 from rftsim.sand.free_surface import FreeSurface
 from rftsim.sand.medium import Sand
 from rftsim.sand.presets import PRESETS, make_sand
+from rftsim.surface import shapes
 from rftsim.surface.triangles import Surface, Wheel, load_surface, make_surface
 
 _plugin.register(_plugin.EXPLICIT)

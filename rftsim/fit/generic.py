@@ -67,7 +67,7 @@ def design(normal: Array, motion: Array, degree: int) -> Array:
         motion: Directions of their motion, shape (k, 3).
         degree: Degree of the polynomials.
     """
-    m = np.where(normal[:, 2:] <= EDGE_ON_DOUBLE, normal, -normal)
+    m = np.where(normal[:, 2:] < -EDGE_ON_DOUBLE, normal, -normal)
     x = np.stack([-motion[:, 2], -m[:, 2], (m * motion).sum(axis=1)], axis=1)
     t = terms(x, degree)
     down = np.broadcast_to([0.0, 0.0, -1.0], m.shape)

@@ -3,13 +3,18 @@
 import ctypes
 import functools
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
-from rftsim.law.layout import GIVEN, HEADER, record
+from rftsim.law.laws import RESPONSES
+from rftsim.law.layout import BED, GIVEN, HEADER, record
 from rftsim.machine import link
 from rftsim.surface.triangles import Array
+
+Flags = np.ndarray[tuple[int], np.dtype[np.bool_]]
+ALONG: Final = 1e-6
+"""How far the cosine of a face's normal to the plane's is from 1 where it counts as along the plane."""
 
 
 def linked() -> Callable[[str], int]:
@@ -32,6 +37,34 @@ def triangle_stresses(
     stress, depth = np.empty((ntri, 3)), np.empty(ntri)
     _function("rftsim_tractions", 8)(*(array.ctypes.data for array in (*arrays, stress, depth)))
     return stress, depth
+
+
+def acts(bed: Array, normals: Array, xmat: Any, stress: Array, depth: Array) -> Flags:
+    """Whether the sand acts on each triangle, shape (ntri,): not above it, behind an edge, or along a 2D law's plane.
+
+    Args:
+        bed: Packed sand.
+        normals: Outward normals, body frame, shape (ntri, 3).
+        xmat: Rotation to the world frame, shape (3, 3).
+        stress: Each triangle's stress, shape (ntri, 3).
+        depth: Each triangle's depth [m], shape (ntri,).
+    """
+    sand = record(bed, BED)
+    found: Flags = (depth > 0.0) & stress.any(axis=1)
+    if RESPONSES[int(sand.response)].planar:
+        found &= crosses(normals, sand.plane @ xmat)
+    return found
+
+
+def crosses(normals: Array, plane: Array) -> Flags:
+    """Whether each face has a part across a plane of motion, shape (ntri,); without one, a 2D law gives it no force.
+
+    Args:
+        normals: Unit normals of the faces, shape (ntri, 3).
+        plane: Unit normal of the plane, in the same frame.
+    """
+    found: Flags = np.abs(normals @ plane) < 1.0 - ALONG
+    return found
 
 
 def body_wrenches(bed: Array, surface: Array, xpos: Array, xmat: Array, velocity: Array, omega: Array) -> Array:

@@ -32,6 +32,11 @@ class Response(NamedTuple):
     felt_depth: Kernel = own_depth
     """The depth that the stress grows with [m], from the triangle's own and the sand; zero or less: no stress."""
 
+    @property
+    def planar(self) -> bool:
+        """Whether it acts in one vertical plane of motion, on area vectors projected onto it."""
+        return self.normal_speed is leading.speed_in_plane
+
 
 class Law(NamedTuple):
     """A force law: a response, whether it is dynamic, and its coefficients."""
@@ -47,7 +52,7 @@ class Law(NamedTuple):
     @property
     def planar(self) -> bool:
         """Whether it acts in one vertical plane of motion, on area vectors projected onto it."""
-        return self.response.normal_speed is leading.speed_in_plane
+        return self.response.planar
 
     @property
     def reads(self) -> tuple[str, ...]:

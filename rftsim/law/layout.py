@@ -52,11 +52,14 @@ HEADER: Final = np.dtype(
         ("ntri", "f8"),
         ("gyration", "f8"),
         ("rim_start", "f8", 3),
+        ("made_from", "f8"),
+        ("gravity", "f8", 3),
     ]
 )
 """The head of a packed surface: leading-edge tolerance; lowest and highest corner [m]; axis, centre [m] and radius
 [m] of a wheel, zero where it is none; number of triangles; their root-mean-square distance from the origin [m]; the
-direction at which the wheel's angles start."""
+direction at which the wheel's angles start; what the surface was made from, and under which gravity [m/s^2], see
+`rftsim.model.stale`, zero where that is not known."""
 
 
 class Columns(NamedTuple):

@@ -1,15 +1,28 @@
-"""The force of sand on one rigid surface, without MuJoCo."""
+"""The force of sand on one rigid surface, without MuJoCo: on each triangle at one pose, or as a whole at many."""
 
-from typing import NamedTuple
+import math
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rftsim.errors import RftsimError
 from rftsim.law import evaluate, layout
 from rftsim.law.laws import Law, get_law
 from rftsim.sand.free_surface import FreeSurface
 from rftsim.sand.medium import Sand
 from rftsim.surface.triangles import Array, Surface
+
+ROTATION_ERROR: Final = 1e-6
+"""Largest error of a rotation: of each number of its product with its transpose."""
+_SHAPES: Final[dict[str, tuple[int, ...]]] = {
+    "position": (3,),
+    "rotation": (3, 3),
+    "velocity": (3,),
+    "angular_velocity": (3,),
+}
+_REST: Final = (0.0, 0.0, 0.0)
+_UPRIGHT: Final = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 class SurfaceForce(NamedTuple):
@@ -24,9 +37,76 @@ class SurfaceForce(NamedTuple):
     depth: Array
     """Effective depth of each centroid [m], shape (ntri,): less the drop behind a wheel; negative above the sand."""
     active: "np.ndarray[tuple[int], np.dtype[np.bool_]]"
-    """Submerged and leading, shape (ntri,)."""
+    """Submerged, leading, and not parallel to the plane of motion of a 2D law, shape (ntri,)."""
     power: float
     """Power of the sand on the body [W]; negative where it resists."""
+
+
+class Wrench(NamedTuple):
+    """The sand's action on a whole surface; world frame. For n poses in one call each shape begins with n."""
+
+    force: Array
+    """[N], shape (3,) or (n, 3)."""
+    moment: Array
+    """About the body's origin [N m], shape (3,) or (n, 3)."""
+
+
+class Intruder:
+    """A rigid surface and the sand around it, packed once for compiled code, which then takes any number of poses.
+
+    Each pose and motion stands for itself: the sand remembers nothing.
+    """
+
+    def __init__(
+        self,
+        surface: Surface,
+        sand: Sand,
+        law: "str | Law" = "rft3d",
+        *,
+        plane: ArrayLike = (0.0, 1.0, 0.0),
+        terrain: FreeSurface | None = None,
+    ) -> None:
+        """Pack a surface and the sand around it.
+
+        Args:
+            surface: Triangles in the body frame.
+            sand: The medium.
+            law: A law, its name, or `rft3d:FILE.toml`, see `get_law`.
+            plane: Normal of the plane of motion of the 2D laws; horizontal.
+            terrain: The sand's surface, by default level at height zero.
+
+        Raises:
+            SandError: The law reads a parameter that is unknown of the sand.
+            ValueError: There is no such law, or the plane's normal is not horizontal.
+        """
+        self.surface, self.sand, self.law = surface, sand, get_law(law)
+        self.terrain = FreeSurface() if terrain is None else terrain
+        self._bed = layout.pack_bed(sand, self.law, self.terrain, plane)
+        self._packed = layout.pack_surface(surface.clustered(layout.BLOCK))
+
+    def wrench(
+        self,
+        position: ArrayLike = _REST,
+        rotation: ArrayLike = _UPRIGHT,
+        velocity: ArrayLike = _REST,
+        angular_velocity: ArrayLike = _REST,
+    ) -> Wrench:
+        """The sand's force and moment at a pose and motion, or at n of them.
+
+        Arguments of n poses go with single ones, which count for each.
+
+        Args:
+            position: The body's origin [m], shape (3,) or (n, 3).
+            rotation: Body to world, shape (3, 3) or (n, 3, 3).
+            velocity: Of the body's origin [m/s], shape (3,) or (n, 3).
+            angular_velocity: World frame [rad/s], shape (3,) or (n, 3).
+
+        Raises:
+            RftsimError: A number is not finite, a rotation turns nothing, or shapes do not fit one another.
+        """
+        many, arrays = _motions(position, rotation, velocity, angular_velocity)
+        out = evaluate.body_wrenches(self._bed, self._packed, *arrays)
+        return Wrench(out[:, :3], out[:, 3:]) if many else Wrench(out[0, :3], out[0, 3:])
 
 
 def surface_force(
@@ -34,14 +114,14 @@ def surface_force(
     sand: Sand,
     law: "str | Law" = "rft3d",
     *,
-    position: ArrayLike = (0.0, 0.0, 0.0),
-    rotation: ArrayLike = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
-    velocity: ArrayLike = (0.0, 0.0, 0.0),
-    angular_velocity: ArrayLike = (0.0, 0.0, 0.0),
+    position: ArrayLike = _REST,
+    rotation: ArrayLike = _UPRIGHT,
+    velocity: ArrayLike = _REST,
+    angular_velocity: ArrayLike = _REST,
     plane: ArrayLike = (0.0, 1.0, 0.0),
     terrain: FreeSurface | None = None,
 ) -> SurfaceForce:
-    """Force of sand on a surface that moves as a rigid body.
+    """Force of sand on a surface that moves as a rigid body, with that on each triangle; for many poses, `Intruder`.
 
     Args:
         surface: Triangles in the body frame.
@@ -53,13 +133,53 @@ def surface_force(
         angular_velocity: World frame [rad/s].
         plane: Normal of the plane of motion of the 2D laws; horizontal.
         terrain: By default level at height zero.
+
+    Raises:
+        SandError: The law reads a parameter that is unknown of the sand.
+        ValueError: There is no such law, the plane's normal is not horizontal, or a number of the pose or the motion is
+            not finite.
     """
     bed = layout.pack_bed(sand, get_law(law), terrain or FreeSurface(), plane)
-    rotation, velocity, omega = (np.array(x, dtype=float) for x in (rotation, velocity, angular_velocity))
-    pose = np.array(position, dtype=float), rotation.ravel()
-    stress, depth = evaluate.triangle_stresses(bed, layout.pack_surface(surface), *pose, velocity, omega)
+    many, arrays = _motions(position, rotation, velocity, angular_velocity)
+    if many:
+        raise RftsimError("surface_force takes one pose: Intruder(surface, sand, law).wrench(...) takes many")
+    place, turn, v, omega = (array[0] for array in arrays)
+    stress, depth = evaluate.triangle_stresses(bed, layout.pack_surface(surface), place, turn, v, omega)
     force = stress.T @ surface.areas
     moment = np.cross(surface.centres, stress).T @ surface.areas
-    force, moment, stress = rotation @ force, rotation @ moment, stress @ rotation.T
-    active = (depth > 0.0) & stress.any(axis=1)
-    return SurfaceForce(force, moment, stress, depth, active, power=float(force @ velocity + moment @ omega))
+    active = evaluate.acts(bed, surface.normals, turn, stress, depth)
+    force, moment, stress = turn @ force, turn @ moment, stress @ turn.T
+    return SurfaceForce(force, moment, stress, depth, active, power=float(force @ v + moment @ omega))
+
+
+def _motions(*given: ArrayLike) -> tuple[bool, list[Array]]:
+    """Whether there are many poses, and positions, rotations, velocities and spins of each, as `body_wrenches` takes.
+
+    Raises:
+        RftsimError: One of them is wrong.
+    """
+    arrays = [np.asarray(value, dtype=float) for value in given]
+    many = {}
+    for (name, shape), array in zip(_SHAPES.items(), arrays, strict=True):
+        if array.shape != shape:
+            if array.ndim != len(shape) + 1 or array.shape[1:] != shape:
+                raise RftsimError(f"{name} must have the shape {shape}, or (n, ...) for n poses, not {array.shape}")
+            many[name] = len(array)
+        if not math.isfinite(array.sum()) and not np.isfinite(array).all():
+            raise RftsimError(f"{name} must be finite, and one number is {array[~np.isfinite(array)][0]}")
+    if len(set(many.values())) > 1:
+        said = ", ".join(f"{count} of {name}" for name, count in many.items())
+        raise RftsimError(f"of poses and motions there must be as many each, or one, not {said}")
+    if given[1] is not _UPRIGHT:
+        _check_rotations(arrays[1].reshape(-1, 3, 3))
+    count = next(iter(many.values()), 1)
+    full = [np.empty((count, *shape)) for shape in _SHAPES.values()]
+    for out, array in zip(full, arrays, strict=True):
+        out[:] = array
+    return bool(many), full
+
+
+def _check_rotations(turns: Array) -> None:
+    error = np.abs(turns @ turns.transpose(0, 2, 1) - np.eye(3)).max(initial=0.0)
+    if error > ROTATION_ERROR or (np.linalg.det(turns) < 0.0).any():
+        raise RftsimError(f"rotation must be orthogonal and right-handed: R R' is off by {error:.1e}, or it mirrors")

@@ -45,10 +45,7 @@ def in_space(fit: Kernel) -> Kernel:
 
     @kernel
     def stress(n: Any, v: Any, up: Any, frame: Any, medium: Any, edge: Any) -> Any:
-        """Stress of 3D-RFT per depth, [Agarwal] eqs. (5.5), (5.6), (5.9).
-
-        Unlike [Agarwal] eq. (5.18), a vertical face counts as facing down (m = n) whichever way it moves.
-        """
+        """Stress of 3D-RFT per depth, [Agarwal] eqs. (5.5), (5.6), (5.9); vertical faces as eq. (5.18) has them."""
         nx, ny, nz = n
         vx, vy, vz = v
         ux, uy, uz = up
@@ -58,7 +55,7 @@ def in_space(fit: Kernel) -> Kernel:
         vu = (vx * ux + vy * uy + vz * uz) * inverse
         normal_speed = vx * nx + vy * ny + vz * nz
         vn = normal_speed * inverse
-        side = 1.0 if nu <= edge.tolerance else -1.0  # m = side * n faces downward, n itself for a wall
+        side = leading.side(nu, edge)
         x1, x2, x3 = -vu, -side * nu, side * vn
         c1, c2, c3 = medium.table
         f1, f2, f3 = fit(c1, x1, x2, x3), fit(c2, x1, x2, x3), fit(c3, x1, x2, x3)

@@ -32,6 +32,7 @@ from rftsim.model.planar import check_planar
 from rftsim.model.readings import reading_doubts
 from rftsim.model.shaping import Fineness
 from rftsim.model.solution import check_solution
+from rftsim.model.stale import mark
 from rftsim.model.standing import stand
 from rftsim.model.wheels import rolling
 from rftsim.model.write import (
@@ -171,11 +172,12 @@ def add_sand(
     check_sensors(spec, felt.surfaces if sensors else ())
     if draw:
         check_drawing(spec, name)
-    notes = [*_doubts(draft, bed_sand, numbers, felt, floors), *(floor_doubts(floors) if keep_floor else ())]
+    packed = _packed(draft.model, felt)
+    notes = [*_doubts(draft, bed_sand, numbers, packed, felt, floors), *(floor_doubts(floors) if keep_floor else ())]
 
     name_bodies(spec, draft)
     carrier = Carrier(name, plugin.IMPLICIT if force == "implicit" else plugin.EXPLICIT)
-    write_bed(spec, carrier, numbers, felt.surfaces)
+    write_bed(spec, carrier, numbers, packed)
     write_sensors(spec, carrier, felt.surfaces if sensors else ())
     if draw:
         write_drawing(spec, name, site.terrain)
@@ -216,14 +218,25 @@ def _integrate(spec: mujoco.MjSpec, force: str) -> list[str]:
     return ["the integrator is implicitfast now: RK4 would take the sand's force at the velocity of the moment"]
 
 
-def _doubts(draft: Draft, sand: Sand, bed: Array, felt: Felt, floors: Floors) -> list[str]:
+def _packed(model: mujoco.MjModel, felt: Felt) -> dict[str, Array]:
+    """The surfaces as numbers, marked with what they were made from, by body name."""
+    packed = {name: layout.pack_surface(surface) for name, surface in felt.surfaces.items()}
+    for name, numbers in packed.items():
+        mark(model, model.body(name).id, numbers)
+    return packed
+
+
+def _doubts(
+    draft: Draft, sand: Sand, bed: Array, surfaces: Mapping[str, Array], felt: Felt, floors: Floors
+) -> list[str]:
     """The doubts about surfaces, gravity and sensors, and those that show when the model stands in its sand."""
     model = draft.model
-    packed = {model.body(name).id: layout.pack_surface(surface) for name, surface in felt.surfaces.items()}
+    packed = {model.body(name).id: numbers for name, numbers in surfaces.items()}
     found = stand(model, draft.data, bed, packed)
     return [
         *felt.doubts,
         *doubts.gravity_doubts(model, sand),
+        *doubts.slope_doubts(model, sand, floors.terrain),
         *reading_doubts(model, packed),
         *doubts.sinkage_doubts(model, found, felt.surfaces),
         *doubts.footprint_doubts(model, found, floors.terrain),

@@ -16,6 +16,10 @@ SMALL: Final = 0.25
 """Footprint of what collides over that of what is seen below which the difference is said [-]."""
 SOLE: Final = 0.5
 """Part of a foot's height, from below, whose outline is its footprint [-]."""
+STEEPEST: Final = 35.0
+"""Angle of repose of a sand of unknown friction, about the steepest there is [degrees]."""
+ROUNDING: Final = 0.01
+"""Angle that is rounding [degrees]."""
 _UNITS: Final = {100.0: "centimetres", 1000.0: "millimetres"}
 
 
@@ -36,6 +40,32 @@ def gravity_doubts(model: mujoco.MjModel, sand: Sand) -> list[str]:
         f"the model's gravity is {gravity:.3g} m/s^2 and the sand's strength belongs to {sand.g:.3g}: if the sand "
         f"is under the model's gravity, pass sand.replace(g={gravity:.4g}), which scales it"
     ]
+
+
+def slope_doubts(model: mujoco.MjModel, sand: Sand, terrain: FreeSurface) -> list[str]:
+    """The doubt about sand too steep to lie, or about gravity that does not point along -z, if there is any."""
+    gravity = np.array(model.opt.gravity)
+    strength = float(np.linalg.norm(gravity))
+    if strength == 0.0:
+        return []
+    tilt, aside = (
+        float(np.degrees(np.arccos(np.clip(-gravity @ up / strength, -1.0, 1.0))))
+        for up in (np.array(terrain.normal), np.array([0.0, 0.0, 1.0]))
+    )
+    repose = STEEPEST if sand.mu_int is None else float(np.degrees(np.arctan(sand.mu_int)))
+    if tilt > repose + ROUNDING:
+        friction = "" if sand.mu_int is None else f" (mu_int {sand.mu_int:g})"
+        return [
+            f"the sand's surface is tilted by {tilt:.3g} degrees against gravity, beyond its angle of repose of "
+            f"{repose:.3g}{friction}: such sand flows, which the laws do not know. Make it flatter, or turn gravity"
+        ]
+    if min(aside, tilt) > ROUNDING:
+        return [
+            f"gravity points {aside:.3g} degrees away from -z, so that the sand lies as on a slope of {tilt:.3g} "
+            "degrees: depth counts along its normal, and the laws were measured on level ground. Its normal is "
+            "that of terrain="
+        ]
+    return []
 
 
 def sinkage_doubts(model: mujoco.MjModel, found: Standing, surfaces: Mapping[str, Surface]) -> list[str]:

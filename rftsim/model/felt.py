@@ -9,7 +9,8 @@ import numpy as np
 
 from rftsim.errors import SceneError
 from rftsim.law import layout
-from rftsim.model.geometry import bounding_geoms, colliding
+from rftsim.law.evaluate import crosses
+from rftsim.model.geometry import bounding_geoms, colliding, own_geoms
 from rftsim.model.reach import clearance
 from rftsim.model.shaping import Fineness, Shaping, shape
 from rftsim.sand.free_surface import FreeSurface
@@ -68,7 +69,7 @@ def felt_bodies(model: mujoco.MjModel, data: mujoco.MjData, choice: Choice) -> F
     unfit = {body: _unfit(model, body, names[body], choice) for body in range(1, model.nbody)}
     shaping = shape(model, [body for body, why in unfit.items() if not why], choice.fineness)
     surfaces, reasons = _within_reach(model, data, unfit, shaping, choice)
-    felt = Felt(surfaces, reasons, [*shaping.choices, *told], shaping.doubts)
+    felt = Felt(surfaces, reasons, [*shaping.choices, *told], [*shaping.doubts, *_mocap_doubts(model, unfit)])
     if not felt.surfaces and choice.terrain is not None and shaping.surfaces:
         surfaces, reasons = _within_reach(model, data, unfit, shaping, choice._replace(terrain=None))
         doubt = "no body can come down to the sand, as its joints go: put the sand higher (terrain=)"
@@ -122,6 +123,8 @@ def _unfit(model: mujoco.MjModel, body: int, name: str, choice: Choice) -> str:
     """Why a body cannot feel the sand, whatever its surface; empty where it can."""
     if choice.bodies is not None and name not in choice.bodies:
         return "not among the bodies asked for"
+    if hangs_on_mocap(model, body):
+        return "hangs on a mocap body, to which MuJoCo gives no velocity: hold a body with a free joint by a weld to it"
     if model.body_weldid[body] == 0:
         return "cannot move"
     if model.body_plugin[body] >= 0:
@@ -129,6 +132,27 @@ def _unfit(model: mujoco.MjModel, body: int, name: str, choice: Choice) -> str:
     if not bounding_geoms(model, body, choice.fineness.geoms):
         return "has no geom that collides" if model.body_geomnum[body] else "has no geom"
     return ""
+
+
+def hangs_on_mocap(model: mujoco.MjModel, body: int) -> bool:
+    """Whether a body is a mocap body or hangs on one, whose motion is in no velocity of MuJoCo's."""
+    return bool(model.body_mocapid[model.body_rootid[body]] >= 0)
+
+
+def _mocap_doubts(model: mujoco.MjModel, unfit: dict[int, str]) -> list[str]:
+    """The doubt about mocap bodies that could touch sand and feel none, if there are any."""
+    names = [
+        model.body(body).name
+        for body, why in unfit.items()
+        if why.startswith("hangs on a mocap") and colliding(model)[own_geoms(model, body)].any()
+    ]
+    if not names:
+        return []
+    more = f" and {len(names) - FEW} more" if len(names) > FEW else ""
+    return [
+        f"no sand acts on {', '.join(names[:FEW])}{more}, as MuJoCo gives a mocap body, and what hangs on it, no "
+        "velocity by the motion of its pose: hold a body with a free joint by a weld to it"
+    ]
 
 
 def _felt_surface(model: mujoco.MjModel, body: int, shaping: Shaping, choice: Choice) -> tuple[Surface | None, str]:
@@ -150,7 +174,7 @@ def _carrying(surface: Surface, plane: Array) -> tuple[Surface, str]:
         surface: The body's surface.
         plane: Normal of the plane of motion, body frame, in which the body stays.
     """
-    carries = np.abs(surface.normals @ plane) < 1.0 - 1e-6
+    carries = crosses(surface.normals, plane)
     if carries.all() or not carries.any():
         return surface, f"moves, {surface.ntri} triangles"
     return (

@@ -8,7 +8,8 @@ import numpy as np
 from rftsim.errors import SceneError, SurfaceError
 from rftsim.model.draft import TEMPORARY
 from rftsim.surface import solids
-from rftsim.surface.triangles import EDGE_ON_SINGLE, Array, Faces, Surface, is_closed, make_surface
+from rftsim.surface.topology import Array, Faces, is_closed
+from rftsim.surface.triangles import EDGE_ON_SINGLE, Surface, make_surface
 
 Meshes = Literal["hull", "exact"]
 """How the meshes of geoms are felt: as the convex hulls that MuJoCo collides with, or as they are where closed."""
@@ -17,7 +18,6 @@ Geoms = Literal["collision", "all"]
 """Which geoms bound a body: those that can collide, or, where a body has none of these, all that it has."""
 
 _GEOM = mujoco.mjtGeom
-_SECTIONS = 24
 LARGER: Final = 1.25
 """Volume of a hull over that of its mesh from which on the difference is said."""
 
@@ -151,23 +151,16 @@ def _convex_hull(vertices: Array, name: str) -> Array:
 
 
 def _primitive(kind: mujoco.mjtGeom, size: Array, label: str) -> tuple[Array, Faces]:
-    """Tessellation of a primitive; round ones are blown up to their exact volume."""
+    """Tessellation of a primitive; round ones have their true volume."""
     if kind == _GEOM.mjGEOM_BOX:
         return _faces(solids.box(2 * size))
     if kind in (_GEOM.mjGEOM_SPHERE, _GEOM.mjGEOM_ELLIPSOID):
-        ball = solids.ball(2)
-        radii = size if kind == _GEOM.mjGEOM_ELLIPSOID else np.full(3, size[0])
-        return _faces(ball * radii * (4 * np.pi / 3 / solids.volume(ball)) ** (1 / 3))
+        return _faces(solids.round_ball(size if kind == _GEOM.mjGEOM_ELLIPSOID else np.full(3, size[0]), 2))
     if kind == _GEOM.mjGEOM_CYLINDER:
-        round_ = solids.cylinder(size[0], 2 * size[1], _SECTIONS)
-        volume = 2 * np.pi * size[0] ** 2 * size[1]
-    elif kind == _GEOM.mjGEOM_CAPSULE:
-        round_ = solids.capsule(size[0], 2 * size[1], _SECTIONS // 2, _SECTIONS)
-        volume = np.pi * size[0] ** 2 * (2 * size[1] + 4 / 3 * size[0])
-    else:
-        raise SceneError(f"{label} is of type {kind.name[len('mjGEOM_') :].lower()}, which has no surface for the sand")
-    widen = np.sqrt(volume / solids.volume(round_))
-    return _faces(round_ * [widen, widen, 1.0])
+        return _faces(solids.round_cylinder(size[0], 2 * size[1], solids.SECTIONS))
+    if kind == _GEOM.mjGEOM_CAPSULE:
+        return _faces(solids.round_capsule(size[0], 2 * size[1], solids.SECTIONS // 2, solids.SECTIONS))
+    raise SceneError(f"{label} is of type {kind.name[len('mjGEOM_') :].lower()}, which has no surface for the sand")
 
 
 def _faces(triangles: Array) -> tuple[Array, Faces]:

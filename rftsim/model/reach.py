@@ -96,8 +96,6 @@ def clearance(model: mujoco.MjModel, body: int, surface: Surface, terrain: FreeS
         return float(tilt @ vector) if tilt is not None else -float(np.linalg.norm(vector))
 
     for part in reversed(chain[:-1]):
-        if model.body_mocapid[part] >= 0:
-            return -math.inf
         height += along(model.body_pos[part])
         if tilt is not None:
             tilt = _turned_back(model.body_quat[part], tilt)

@@ -8,6 +8,7 @@ import numpy as np
 from rftsim.engine.block import BODY_MARKER, SAND_MARKER, read_block
 from rftsim.errors import SceneError
 from rftsim.law import evaluate, layout
+from rftsim.model.stale import tell_stale
 from rftsim.model.write import DRAWING_MARKER
 from rftsim.surface.triangles import Array
 
@@ -123,7 +124,9 @@ def wrenches(model: mujoco.MjModel, data: mujoco.MjData) -> Wrenches:
     of a split one; what MuJoCo is handed then is the generalised force that ends the step in the same place.
     """
     force, moment = np.zeros((model.nbody, 3)), np.zeros((model.nbody, 3))
-    for bed in instances(model):
+    beds = instances(model)
+    tell_stale(model, [item for bed in beds for item in bed.bodies.items()])
+    for bed in beds:
         block = read_block(int(data.plugin_data[bed.id]), data._address, bed.id)
         force[block.bodies], moment[block.bodies] = block.wrenches[:, :3], block.wrenches[:, 3:]
     velocity, omega = body_velocities(model, data)
@@ -143,6 +146,7 @@ def tractions(model: mujoco.MjModel, data: mujoco.MjData, body: "int | str") -> 
     else:
         raise SceneError(f"body {model.body(index).name!r} does not feel sand")
     surface = bed.bodies[index]
+    tell_stale(model, [(index, surface)])
     velocity, omega = body_velocities(model, data)
     rotation = data.xmat[index].reshape(3, 3)
     stress, depth = evaluate.triangle_stresses(
@@ -156,7 +160,7 @@ def tractions(model: mujoco.MjModel, data: mujoco.MjData, body: "int | str") -> 
         area=area,
         depth=depth,
         stress=stress @ rotation.T,
-        active=(depth > 0.0) & stress.any(axis=1),
+        active=evaluate.acts(bed.packed, normal, rotation, stress, depth),
     )
 
 

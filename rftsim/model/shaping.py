@@ -3,17 +3,15 @@
 import itertools
 import math
 from collections.abc import Iterable, Sequence
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 import mujoco
 
 from rftsim.errors import RftsimError, SurfaceError
 from rftsim.model.geometry import LARGER, Geoms, Meshes, Part, bounding_geoms, colliding, geom_label, geom_part
+from rftsim.surface.shapes import FINENESS
 from rftsim.surface.triangles import Array, Surface, joined
 from rftsim.surface.union import overlapping, united
-
-FINENESS: Final = 6
-"""Edges of a geom's triangles are at most its size over this, unless the caller says otherwise."""
 
 
 class Fineness(NamedTuple):

@@ -8,9 +8,8 @@ import mujoco
 
 from rftsim.engine import block as engine
 from rftsim.errors import SceneError
-from rftsim.law import layout
 from rftsim.sand.free_surface import FreeSurface
-from rftsim.surface.triangles import Array, Surface
+from rftsim.surface.triangles import Array
 
 SAND_RGBA: Final = (1.0, 1.0, 1.0, 0.75)
 """Colour by which the texture of the drawn sand is multiplied, and its opacity."""
@@ -65,21 +64,20 @@ def check_drawing(spec: mujoco.MjSpec, name: str) -> None:
             raise SceneError(f"the model has a {kind} {_drawing(name)!r} already: rename it, or pass draw=False")
 
 
-def write_bed(spec: mujoco.MjSpec, carrier: Carrier, bed: Array, surfaces: Mapping[str, Surface]) -> None:
+def write_bed(spec: mujoco.MjSpec, carrier: Carrier, bed: Array, surfaces: Mapping[str, Array]) -> None:
     """Put a bed of sand and the surfaces of bodies into a spec.
 
     Args:
         spec: The model; every body that feels the sand has its name.
         carrier: The plugin instance that is made.
         bed: Packed sand.
-        surfaces: Surface of each body that feels the sand, by body name.
+        surfaces: Packed surface of each body that feels the sand, by body name.
     """
     spec.activate_plugin(carrier.plugin)
     spec.add_plugin(name=carrier.name, plugin_name=carrier.plugin, active=True)
     spec.add_numeric(name=engine.SAND_MARKER + carrier.name, data=bed, size=bed.size)
-    for body, surface in surfaces.items():
+    for body, data in surfaces.items():
         _attach(spec.body(body).plugin, carrier)
-        data = layout.pack_surface(surface)
         for first in range(0, data.size, engine.CHUNK):
             chunk = data[first : first + engine.CHUNK]
             more = f"{first // engine.CHUNK}-" if first else ""

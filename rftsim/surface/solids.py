@@ -9,6 +9,8 @@ import numpy as np
 
 from rftsim.surface.splitting import Array, quartered
 
+SECTIONS: Final = 24
+"""Sides of round solids, unless more are asked for."""
 _SHORT: Final = 0.5257311121191336  # sqrt((5 - sqrt 5) / 10)
 _LONG: Final = 0.85065080835204  # sqrt((5 + sqrt 5) / 10)
 _ICOSAHEDRON: Final = np.array(
@@ -90,6 +92,36 @@ def revolved(profile: Array, sections: int) -> Array:
     double = np.linalg.norm(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=1)
     kept: Array = triangles[double > 2e-8 * np.ptp(profile) ** 2]
     return kept
+
+
+def round_ball(radii: Array, subdivisions: int) -> Array:
+    """A faceted ellipsoid of the true volume.
+
+    Args:
+        radii: Half axes [m], shape (3,).
+        subdivisions: See `ball`.
+    """
+    unit = ball(subdivisions)
+    blown_up: Array = unit * radii * (4.0 * np.pi / 3.0 / volume(unit)) ** (1.0 / 3.0)
+    return blown_up
+
+
+def round_cylinder(radius: float, height: float, sections: int) -> Array:
+    """A faceted cylinder about z of the true volume and height, see `cylinder`."""
+    return _widened(cylinder(radius, height, sections), np.pi * radius**2 * height)
+
+
+def round_capsule(radius: float, height: float, sections: int, rings: int) -> Array:
+    """A faceted capsule about z of the true volume and length, see `capsule`."""
+    true = np.pi * radius**2 * (height + 4.0 / 3.0 * radius)
+    return _widened(capsule(radius, height, sections, rings), true)
+
+
+def _widened(triangles: Array, true: float) -> Array:
+    """A solid about z made wider, so that it has a volume [m^3]."""
+    widen = np.sqrt(true / volume(triangles))
+    wider: Array = triangles * [widen, widen, 1.0]
+    return wider
 
 
 def volume(triangles: Array) -> float:

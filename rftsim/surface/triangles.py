@@ -2,16 +2,16 @@
 
 import dataclasses
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rftsim.errors import SurfaceError
+from rftsim.surface.shells import outer, wound
 from rftsim.surface.splitting import split
-
-Array = NDArray[np.float64]
-Faces = NDArray[np.integer[Any]]
+from rftsim.surface.topology import Array as Array
+from rftsim.surface.topology import Faces, needed, open_face, welded
 
 EDGE_ON_DOUBLE: Final = 1e-9
 """Leading-edge tolerance on n.v_hat [-]: rounding of normals computed in double precision."""
@@ -155,21 +155,20 @@ def make_surface(
     extent = float(np.linalg.norm(np.ptp(points, axis=0)))
     areas = np.linalg.norm(np.cross(*_edges(points[corners])), axis=1) / 2.0
     corners = _kept(corners, areas > 1e-14 * extent**2, f"{name}: dropped %d faces of no area", notes)
-    unique = np.zeros(len(corners), dtype=bool)
-    unique[_distinct(np.sort(corners, axis=1))[0]] = True
-    corners = _kept(corners, unique, f"{name}: dropped %d repeated faces", notes)
     if not len(corners):
         raise SurfaceError(f"{name} has no face with an area; the sand needs a closed triangle mesh")
-    corners = _wound(points, corners, name, notes)
-    open_face = _open_face(corners)
-    if open_face is not None:
-        near = _point(points[corners[open_face]].mean(axis=0))
-        text = f"{name} is open at face {open_face} of {len(corners)}, near {near}"
+    corners = _kept(corners, needed(corners), f"{name}: dropped %d repeated faces", notes)
+    corners, is_turned = wound(points, corners)
+    gap = open_face(corners)
+    if gap is not None:
+        near = _point(points[corners[gap]].mean(axis=0))
+        text = f"{name} is open at face {gap} of {len(corners)}, near {near}"
         if not allow_open:
             raise SurfaceError(f"{text}: close it, or allow open meshes (then only its outer side is felt)")
         notes.append(text)
-    notes += _size_doubts(float(np.ptp(points, axis=0).max()), name)
-    return Surface(points[corners], edge_on=edge_on, notes=tuple(notes))
+    triangles, found = outer(points, corners, is_turned, name)
+    doubts = _size_doubts(float(np.ptp(points, axis=0).max()), name)
+    return Surface(triangles, edge_on=edge_on, notes=(*notes, *found, *doubts))
 
 
 def _check_faces(points: Array, faces: Faces, name: str) -> None:
@@ -223,108 +222,11 @@ def _point(x: ArrayLike) -> str:
     return "(" + ", ".join(f"{value:.4g}" for value in np.asarray(x)) + ")"
 
 
-def welded(points: Array, faces: Faces) -> tuple[Array, Faces]:
-    """Vertices that faces have, none twice, to 1e-8, and the faces on them."""
-    used, faces = np.unique(faces, return_inverse=True)
-    points = points[used]
-    first, same = _distinct(np.round(points * 1e8).astype(np.int64))
-    return points[first], same[faces].reshape(-1, 3)
-
-
-def _distinct(rows: Faces) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Where each distinct row of integers is first, and which of these each row is."""
-    first, same = np.zeros(1, dtype=int), np.zeros(len(rows), dtype=int)
-    for column in rows.T:
-        value = np.unique(column, return_inverse=True)[1]
-        _, first, same = np.unique(same * (value.max(initial=0) + 1) + value, return_index=True, return_inverse=True)
-    return first, same
-
-
 def _kept(faces: Faces, keep: NDArray[np.bool_], note: str, notes: list[str]) -> Faces:
     if not keep.all():
         notes.append(note % np.count_nonzero(~keep))
     return faces[keep]
 
 
-def _wound(points: Array, before: Faces, name: str, notes: list[str]) -> Faces:
-    """Make the winding consistent and outward, and drop shells that lie inside another: no sand reaches them."""
-    faces = before.copy()
-    if _open_face(faces) is not None:
-        import trimesh  # not at start-up, which it would slow by a second
-
-        mesh = trimesh.Trimesh(points, faces, process=False)
-        trimesh.repair.fix_winding(mesh)
-        faces = np.array(mesh.faces)
-    labels = _shells(faces)
-    triangles = points[faces]
-    shells = [np.flatnonzero(labels == label) for label in np.unique(labels)]
-    enclosed = np.zeros(len(faces), dtype=bool)
-    for shell in shells:
-        others = [other for other in shells if other is not shell]
-        point = triangles[shell[0], 0]
-        enclosed[shell] = any(abs(_winding_number(triangles[other], point)) > 0.5 for other in others)
-        volume = np.einsum("ij,ij->", triangles[shell].mean(axis=1), np.cross(*_edges(triangles[shell]))) / 6.0
-        if volume < 0.0 and not enclosed[shell[0]]:
-            faces[shell] = faces[shell][:, ::-1]
-    flipped = int((_cyclic(before) != _cyclic(faces)).any(axis=1)[~enclosed].sum())
-    if flipped:
-        notes.append(f"{name}: turned {flipped} of {len(faces)} faces outward")
-    return _kept(faces, ~enclosed, f"{name}: dropped %d faces of shells inside another, which no sand reaches", notes)
-
-
-def _shells(faces: Faces) -> NDArray[np.intp]:
-    """A number for each face, the same where edges that two faces share lead from one to the other."""
-    edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    edge = _distinct(edges)[1]
-    order = np.argsort(edge, kind="stable")
-    order = order[np.bincount(edge)[edge[order]] == 2]
-    one, other = order[::2] // 3, order[1::2] // 3
-    labels = np.arange(len(faces))
-    while True:
-        least = np.minimum(labels[one], labels[other])
-        lower = labels.copy()
-        for face in (one, other):
-            np.minimum.at(lower, face, least)
-            np.minimum.at(lower, labels[face], least)
-        lower = lower[lower]
-        if (lower == labels).all():
-            return labels
-        labels = lower
-
-
-def _winding_number(triangles: Array, point: Array) -> float:
-    """How often a closed shell winds around a point: solid angles, by Van Oosterom and Strackee's formula."""
-    a, b, c = np.moveaxis(triangles - point, 1, 0)
-    la, lb, lc = (np.linalg.norm(side, axis=1) for side in (a, b, c))
-    triple = np.einsum("ij,ij->i", a, np.cross(b, c))
-    dots = (np.einsum("ij,ij->i", u, v) for u, v in ((a, b), (b, c), (c, a)))
-    ab, bc, ca = dots
-    return float(np.arctan2(triple, la * lb * lc + ab * lc + bc * la + ca * lb).sum() / (2 * np.pi))
-
-
 def _edges(triangles: Array) -> tuple[Array, Array]:
     return triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
-
-
-def _cyclic(faces: Faces) -> Faces:
-    """Faces rotated so that the smallest vertex comes first, which leaves the winding."""
-    start = np.argmin(faces, axis=1)[:, None]
-    return np.take_along_axis(faces, (start + np.arange(3)) % 3, axis=1)
-
-
-def is_closed(faces: Faces) -> bool:
-    """Whether each directed edge of faces, shape (nface, 3), has its opposite."""
-    return _open_face(faces) is None
-
-
-def _open_face(faces: Faces) -> int | None:
-    """A face one of whose directed edges has no opposite, or None where the surface is closed."""
-    tail, head = faces[:, [0, 1, 2]].ravel(), faces[:, [1, 2, 0]].ravel()
-    n = int(faces.max()) + 1
-    codes, counts = np.unique(np.concatenate([tail * n + head, head * n + tail]), return_counts=True)
-    forward = np.zeros(len(codes), dtype=int)
-    np.add.at(forward, np.searchsorted(codes, tail * n + head), 1)
-    unbalanced = codes[2 * forward != counts]
-    if not len(unbalanced):
-        return None
-    return int(np.argmax(np.isin(tail * n + head, unbalanced))) // 3

@@ -28,7 +28,7 @@ static inline void add(long n, const double *columns, long apart, const Case *c,
     double speed = sqrt(vx * vx + vy * vy + vz * vz);
     double ex = vx / speed, ey = vy / speed, ez = vz / speed;
     double vn = ex * nx[i] + ey * ny[i] + ez * nz[i];
-    double side = nz[i] <= 0 ? 1.0 : -1.0;
+    double side = nz[i] < 0 ? 1.0 : -1.0;
     double x1 = -ez, x2 = -side * nz[i], x3 = side * vn;
     double f1 = cubic(t, x1, x2, x3), f2 = cubic(t + 20, x1, x2, x3), f3 = cubic(t + 40, x1, x2, x3);
     double ax = f1 * side * nx[i] + f2 * ex, ay = f1 * side * ny[i] + f2 * ey, az = f1 * side * nz[i] + f2 * ez - f3;
