@@ -48,7 +48,8 @@ def parsed(parse: Callable[[], Any]) -> Any:
         if end.code in (0, None):  # --help
             raise
         text = re.sub(r"\x1b\[[0-9;]*m|[╭╮╰╯│]", "", box.getvalue()).partition("\n")[2]
-        parts = [" ".join(part.split()) for part in RULE.split(text) if part.strip()] or ["these arguments are no command"]
+        parts = [" ".join(part.split()) for part in RULE.split(text) if part.strip()]
+        parts = parts or ["these arguments are no command"]
         raise RftsimError("; ".join(dict.fromkeys([parts[0].rstrip("."), parts[-1]]))) from None
 
 

@@ -173,6 +173,17 @@ def finite(name: str, value: object) -> float:
     return found
 
 
+def check_parameter(name: str, value: object) -> None:
+    """Refuse a value of a parameter that no sand has; None is unknown, and may be.
+
+    Raises:
+        SandError: It is no finite number, or outside the parameter's bounds.
+    """
+    if value is not None:
+        (field,) = (field for field in dataclasses.fields(Sand) if field.name == name)
+        check_bounds(field, finite(name, value))
+
+
 def check_bounds(field: "dataclasses.Field[Any]", value: float | None) -> None:
     """Refuse a value that the bounds of its field exclude; None is unknown, and within any.
 
