@@ -4,33 +4,47 @@ import contextlib
 import hashlib
 import json
 import os
+import shutil
 import tempfile
+import tomllib
+import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from rftsim.errors import RftsimError
+from rftsim.errors import RftsimError, RftsimWarning
 
 
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """A context with a temporary file beside `path`, which takes its place on the disk when the block ends well.
+    """A context with a temporary file, which takes the place of `path` on the disk when the block ends well.
+
+    Until it is whole it lies in the system's folder of temporary files, so that a process that is killed leaves nothing
+    beside `path`.
 
     Raises:
         RftsimError: The folder cannot be written.
     """
     check_writable(path)
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}-", suffix=path.suffix)
-    os.close(handle)
-    temporary = Path(name)
-    try:
+    with tempfile.TemporaryDirectory(prefix="rftsim-") as folder:
+        temporary = Path(folder) / path.name
         yield temporary
-        with temporary.open("rb") as written:
-            os.fsync(written.fileno())
-        temporary.chmod(0o644)
-        temporary.replace(path)
+        _put(temporary, path)
+
+
+def _put(whole: Path, path: Path) -> None:
+    """Put a file that is whole in its place, from which other file system it may be."""
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}-", suffix=path.suffix)
+    beside = Path(name)
+    try:
+        with whole.open("rb") as source, open(handle, "wb") as target:
+            shutil.copyfileobj(source, target)
+            target.flush()
+            os.fsync(target.fileno())
+        beside.chmod(0o644)
+        beside.replace(path)
     finally:
-        temporary.unlink(missing_ok=True)
+        beside.unlink(missing_ok=True)
 
 
 def check_writable(path: Path, *suffixes: str) -> None:
@@ -49,11 +63,31 @@ def check_writable(path: Path, *suffixes: str) -> None:
         raise RftsimError(f"cannot write to {path.parent}")
 
 
+def read_toml(path: Path, what: str) -> dict[str, Any]:
+    """The tables of a TOML file.
+
+    Args:
+        path: The file.
+        what: What it should be, for errors: `sand`.
+
+    Raises:
+        RftsimError: It cannot be read, or is no TOML.
+    """
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except OSError as error:
+        raise RftsimError(f"cannot read the {what} file {path}: {error.strerror}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise RftsimError(f"the {what} file {path} is not TOML: {error}") from None
+    except (RecursionError, ValueError):  # brackets within brackets, and whole numbers of thousands of digits
+        raise RftsimError(f"the {what} file {path} is nested too deeply, or has a number too long to be read") from None
+
+
 class Kept:
     """Measurements by name, kept in a file from one run to the next.
 
     Args:
-        path: The file, in JSON; written whole after each measurement.
+        path: The file, in JSON; written whole after each measurement. Of one that is damaged nothing is taken.
         inputs: All that the measurements depend on; what was kept under other inputs is measured again.
     """
 
@@ -62,14 +96,32 @@ class Kept:
         self.key = hashlib.sha256(inputs).hexdigest()
         self.known: dict[str, Any] = {}
         if path.is_file():
-            kept = json.loads(path.read_text())
-            if kept.get("key") == self.key:
+            kept = _kept(path)
+            if kept is None:
+                warnings.warn(f"{path} is damaged: all is measured again", RftsimWarning, stacklevel=2)
+            elif kept["key"] == self.key:
                 self.known = kept["known"]
 
     def get(self, name: str, measure: Callable[[], Any]) -> Any:
         """The measurement of that name, as JSON has it, by `measure` now or from before."""
         if name not in self.known:
             self.known[name] = measure()
+            kept = {"key": self.key, "known": self.known}
             with replacing(self.path) as temporary:
-                temporary.write_text(json.dumps({"key": self.key, "known": self.known}))
+                temporary.write_text(json.dumps({**kept, "sha256": _checksum(kept)}))
         return self.known[name]
+
+
+def _kept(path: Path) -> dict[str, Any] | None:
+    """What a file of measurements holds; None where that is not what was written."""
+    try:
+        kept = json.loads(path.read_text())
+        whole = kept.pop("sha256") == _checksum(kept) and isinstance(kept["known"], dict) and "key" in kept
+    except (ValueError, RecursionError, AttributeError, KeyError, TypeError):
+        return None
+    return kept if whole else None
+
+
+def _checksum(value: object) -> str:
+    """The SHA-256 of a value, as JSON has it."""
+    return hashlib.sha256(json.dumps(value).encode()).hexdigest()

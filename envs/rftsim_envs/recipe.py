@@ -1,7 +1,6 @@
 """Recipes: settings of a policy's training, and the drives that it has to beat."""
 
 import dataclasses
-import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -13,6 +12,12 @@ from rftsim_envs.settings import check_positive, convert_fields
 
 Drive = Callable[[float], Array]
 """Controller that sees nothing: an action, (naction,), from the time since the episode's start [s]."""
+
+
+MOST_ENVS, MOST_COLLECTED, MOST_UPDATES, DEEPEST, WIDEST = 16_384, 100_000_000, 1_000_000, 16, 4096
+"""Most simulations, control steps before an update, updates, layers and units of one: more would fill a memory."""
+FARTHEST_LOG_STD = 10.0
+"""Largest size of the logarithm of the actions' standard deviation at the start."""
 
 
 def constant(*action: float) -> Drive:
@@ -66,6 +71,15 @@ class Training:
         check_positive(self, positive, TrainingError)
         if self.batch_size < 2 or min(self.layers, default=0) < 1:
             raise TrainingError("batch_size must be at least 2, and layers one or more numbers of units")
+        if self.n_envs > MOST_ENVS or self.n_envs * self.n_steps > MOST_COLLECTED or len(self.updates()) > MOST_UPDATES:
+            raise TrainingError(
+                f"there are at most {MOST_ENVS} simulations, {MOST_COLLECTED:g} steps before an update and "
+                f"{MOST_UPDATES:g} updates, not n_envs = {self.n_envs}, n_steps = {self.n_steps}, steps = {self.steps}"
+            )
+        if max(self.layers) > WIDEST or len(self.layers) > DEEPEST:
+            raise TrainingError(f"there are at most {DEEPEST} layers of at most {WIDEST} units, not {self.layers}")
+        if self.learning_rate > 1.0 or abs(self.log_std_init) > FARTHEST_LOG_STD:
+            raise TrainingError(f"learning_rate is at most 1, and log_std_init within {FARTHEST_LOG_STD:g} of zero")
         if not (0.0 < self.gamma <= 1.0 and 0.0 <= self.gae_lambda <= 1.0):
             raise TrainingError("gamma must be above 0 and at most 1, and gae_lambda between 0 and 1")
 
@@ -83,6 +97,6 @@ class Training:
 
     def updates(self) -> list[int]:
         """Numbers of control steps of each simulation before each update; together they make `steps`, rounded up."""
-        each = math.ceil(self.steps / self.n_envs)
-        count = math.ceil(each / self.n_steps)
+        each = -(-self.steps // self.n_envs)
+        count = min(-(-each // self.n_steps), MOST_UPDATES + 1)
         return [each * (k + 1) // count - each * k // count for k in range(count)]

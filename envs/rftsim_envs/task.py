@@ -16,6 +16,9 @@ from rftsim_envs.physics import Array, Flags
 from rftsim_envs.recipe import Drive, Training
 from rftsim_envs.settings import check_positive, convert_fields
 
+MOST_SUBSTEPS, MOST_STEPS = 1e6, 1e9
+"""Most time steps of a control step, and most control steps of an episode."""
+
 
 class ConfigError(RftsimError, ValueError):
     """A setting of an environment that cannot be."""
@@ -62,6 +65,11 @@ class Config:
             if not 0.0 < low <= high:
                 raise ConfigError(f"{name} must be a range of positive factors, low to high, not {(low, high)}")
         check_positive(self, ("timestep", "period", "duration"), ConfigError)
+        if self.period > MOST_SUBSTEPS * self.timestep or self.duration > MOST_STEPS * self.period:
+            raise ConfigError(
+                f"a period has at most {MOST_SUBSTEPS:g} timesteps, and a duration {MOST_STEPS:g} periods, not "
+                f"{self.timestep:g}, {self.period:g} and {self.duration:g} s"
+            )
         if not 0.0 <= self.slope_deg < 45.0:
             raise ConfigError(f"slope_deg must be at least 0 and below 45, not {self.slope_deg:g}")
         if not math.isclose(self.substeps * self.timestep, self.period, rel_tol=1e-9) or self.substeps < 1:

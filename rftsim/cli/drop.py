@@ -45,7 +45,7 @@ class Drop(Scene):
             raise RftsimError(f"the limit must be positive, not {self.limit:g} s")
         if self.output:
             check_writable(self.output, ".xml", ".npz")
-        staged = self.staged(timestep=self.timestep)
+        staged = self.staged(timestep=self.timestep, duration=self.limit)
         settled = self._settle(staged)
         if self.output:
             _write(settled, self.output)

@@ -20,6 +20,8 @@ from rftsim.files import check_writable
 if TYPE_CHECKING:
     from rftsim_envs.training.evaluate import Score
 
+MOST_EPISODES = 10_000
+"""Most episodes on a ground, which are simulated side by side."""
 NUMBERS = {"speed": "speed [m/s]", "cost_of_transport": "CoT", "early": "early [%]"}
 """Headings of what is printed beside the return, by name."""
 
@@ -61,8 +63,10 @@ class Evaluate:
             from rftsim_envs.training import evaluate
             from rftsim_envs.training.folder import Folder
             from rftsim_envs.training.spread import spread
-        if not self.runs or self.episodes < 1:
-            raise RftsimError("evaluate takes at least one folder and one episode")
+        if not self.runs or not 1 <= self.episodes <= MOST_EPISODES or self.seed < 0:
+            raise RftsimError(
+                f"evaluate takes at least one folder, 1 to {MOST_EPISODES} episodes, and a seed of zero or more"
+            )
         if self.plot:
             check_writable(self.plot, ".png", ".pdf", ".svg")
         runs = {group: evaluate.runs(group) for group in self.runs}

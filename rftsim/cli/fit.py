@@ -1,6 +1,7 @@
 """`rftsim fit`: from data to a law, or to the parameters of a sand."""
 
 import dataclasses
+import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -20,7 +21,7 @@ from rftsim.fit.pictures import plot_map, plot_trial
 from rftsim.fit.plates import Campaign, Plates, read_campaign, read_csv
 from rftsim.fit.report import FOLDS, Report, report
 from rftsim.law.law_file import law_text, toml
-from rftsim.sand.medium import ALPHA_Z_PLATE, Sand
+from rftsim.sand.medium import ALPHA_Z_PLATE, Sand, check_parameter
 from rftsim.sand.presets import make_sand, read_parameters
 from rftsim.sand.strength import xi_n_from_table
 
@@ -59,8 +60,10 @@ class Map:
         """Fit the data, print the result, write it and draw it."""
         if self.output:
             check_writable(self.output, ".toml")
-        if self.prior is not None and not self.prior >= 0.0:
+        if self.prior is not None and not 0.0 <= self.prior < math.inf:
             raise RftsimError(f"prior must be zero or more plates, not {self.prior:g}")
+        for name in ("rho_c", "mu_int", "mu_surf"):
+            check_parameter(name, getattr(self, name))
         picture = picture_in(self.plot, "fit-map")
         plates, sand, campaigns = self._read()
         settings = Settings(self.degree, self.prior or 0.0, self.dissipative)

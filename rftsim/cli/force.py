@@ -1,13 +1,16 @@
 """`rftsim force`: the sand's force on a rigid mesh."""
 
 import dataclasses
+import math
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import tyro
 from rich.console import Console
 
 from rftsim.cli.output import print_json, print_line
+from rftsim.errors import RftsimError
 from rftsim.law.rigid import surface_force
 from rftsim.sand.presets import make_sand
 from rftsim.surface.triangles import load_surface
@@ -47,6 +50,10 @@ class Force:
 
     def __call__(self, warnings: Callable[[], list[str]]) -> None:
         """Evaluate the law on the mesh, and print the result."""
+        for name in ("position", "velocity", "angular_velocity", "plane"):
+            vector = getattr(self, name)
+            if not all(map(math.isfinite, vector)):
+                raise RftsimError(f"{name} must be three finite numbers, not {vector}")
         sand = make_sand(self.sand)
         surface = load_surface(self.mesh, scale=self.scale, allow_open=self.allow_open)
         result = surface_force(
@@ -58,6 +65,8 @@ class Force:
             angular_velocity=self.angular_velocity,
             plane=self.plane,
         )
+        if not (np.isfinite(result.force).all() and np.isfinite(result.moment).all() and math.isfinite(result.power)):
+            raise RftsimError("the force is too large for a number: give smaller sizes, depths, speeds or strengths")
         report = {
             "force_N": result.force.tolist(),
             "moment_Nm": result.moment.tolist(),

@@ -11,6 +11,7 @@ from rich.markup import escape
 from rftsim.cli.bench import Bench
 from rftsim.cli.demo import Demo
 from rftsim.cli.drop import Drop
+from rftsim.cli.ends import ERRORS, REFUSED, STOPPED, parsed, said, terminable
 from rftsim.cli.evaluate import Evaluate
 from rftsim.cli.fit import Fit
 from rftsim.cli.force import Force
@@ -21,7 +22,7 @@ from rftsim.cli.run import Run
 from rftsim.cli.train import Train
 from rftsim.cli.validate import Validate
 from rftsim.cli.view import View
-from rftsim.errors import RftsimError, RftsimNote, RftsimWarning
+from rftsim.errors import RftsimNote, RftsimWarning
 
 Command = (
     Annotated[Force, tyro.conf.subcommand("force")]
@@ -40,27 +41,40 @@ Command = (
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run the command that the arguments name; exit with 2 where its input cannot be."""
+    """Run the command that the arguments name; exit with 2 where its input cannot be, and with 130 after Ctrl-C."""
     console = Console(stderr=True)
-    command: Any = tyro.cli(
+    with terminable(), warnings.catch_warnings(record=True) as caught:
+        for kind in (RftsimNote, RftsimWarning):
+            warnings.simplefilter("always", kind)
+        try:
+            command = parsed(lambda: _parse(arguments))
+            command(lambda: texts_of(caught, RftsimWarning))
+        except KeyboardInterrupt:
+            print_line(console, "stopped")
+            sys.exit(STOPPED)
+        except ERRORS as error:
+            print_line(console, f"[red]error:[/red] {escape(said(error))}")
+            sys.exit(REFUSED)
+        except SystemExit:
+            _print_notes(console, caught)
+            raise
+        _print_notes(console, caught)
+
+
+def _parse(arguments: list[str] | None) -> Any:
+    return tyro.cli(
         Command,
         prog="rftsim",
         description="Sand for MuJoCo: granular resistive forces on the bodies of any model.",
         args=arguments,
         config=(tyro.conf.OmitArgPrefixes,),
     )
-    with warnings.catch_warnings(record=True) as caught:
-        for kind in (RftsimNote, RftsimWarning):
-            warnings.simplefilter("always", kind)
-        try:
-            command(lambda: texts_of(caught, RftsimWarning))
-        except (RftsimError, ValueError, OSError) as error:
-            print_line(console, f"[red]error:[/red] {escape(str(error))}")
-            sys.exit(2)
-        finally:
-            for note in texts_of(caught, RftsimNote):
-                print_line(console, f"[cyan]note:[/cyan] {escape(note)}")
-            print_doubts(console, texts_of(caught, RftsimWarning))
+
+
+def _print_notes(console: Console, caught: list[warnings.WarningMessage]) -> None:
+    for note in texts_of(caught, RftsimNote):
+        print_line(console, f"[cyan]note:[/cyan] {escape(note)}")
+    print_doubts(console, texts_of(caught, RftsimWarning))
 
 
 def texts_of(caught: list[warnings.WarningMessage], kind: type[Warning]) -> list[str]:

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from rftsim_envs.training.actors import Maker
     from rftsim_envs.training.folder import Folder
 
+LONGEST = 1e6
+"""Longest time of an episode that may be asked for [s]."""
 SHOWN = {"r": "return", "l": "steps", "speed": "speed [m/s]", "command": "commanded [m/s]", "slip": "slip"}
 SHOWN |= {"power": "power [W]", "cost_of_transport": "cost of transport"}
 """Headings of what an episode came to, by name."""
@@ -61,8 +63,10 @@ class Play:
             from rftsim_envs.env import SandEnv
             from rftsim_envs.training import play
             from rftsim_envs.training.folder import Folder, make_plan
-        if self.episodes < 1 or (self.seconds is not None and not self.seconds > 0.0):
-            raise RftsimError("episodes must be at least 1, and seconds positive")
+        if self.episodes < 1 or self.seed < 0 or (self.seconds is not None and not 0.0 < self.seconds <= LONGEST):
+            raise RftsimError(
+                f"episodes must be at least 1, seed zero or more, and seconds positive, {LONGEST:g} at most"
+            )
         folder = Folder(self.run)
         plan = folder.plan() if folder.exists else make_plan(self.run)
         who = self.actions or ("policy" if folder.exists else "random")

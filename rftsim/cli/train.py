@@ -67,6 +67,9 @@ class Train:
         with needing("train"):
             from rftsim_envs.training.campaign import make_plans
             from rftsim_envs.training.folder import make_plan
+        if self.tensorboard:
+            with needing("tensorboard"):
+                import tensorboard  # noqa: F401
         changes: dict[str, Any] = read_settings(self.hyper)
         changes |= {"steps": self.steps} if self.steps is not None else {}
         changes |= {"n_envs": self.envs} if self.envs is not None else {}
@@ -141,19 +144,20 @@ def _said(steps: int, began: int, done: bool, out: Path) -> str:
 
 @contextlib.contextmanager
 def interruptible() -> Iterator[Callable[[], bool]]:
-    """Make the first Ctrl-C a question that the block answers; a second one is KeyboardInterrupt, as ever."""
+    """Make the first Ctrl-C, or SIGTERM, a question that the block answers; a second one ends it, as ever."""
     asked = False
 
     def ask(number: int, frame: object) -> None:
         nonlocal asked
         asked = True
-        signal.signal(signal.SIGINT, before)
+        signal.signal(number, before[number])
 
-    before = signal.signal(signal.SIGINT, ask)
+    before = {number: signal.signal(number, ask) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield lambda: asked
     finally:
-        signal.signal(signal.SIGINT, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 @contextlib.contextmanager

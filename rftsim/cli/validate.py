@@ -15,6 +15,7 @@ from rich.table import Table
 from rftsim.cli.output import print_json, print_line, progress
 from rftsim.cli.results import draw, picture_in, remembered_in
 from rftsim.errors import RftsimError
+from rftsim.validation.cmu import FILES
 from rftsim.validation.measured import DATA
 from rftsim.validation.study import Request, Row, plot_study
 
@@ -60,6 +61,8 @@ class Validate:
             raise RftsimError("--json and --markdown exclude one another: give one")
         if self.data is not None and not self.data.is_dir():
             raise RftsimError(f"no folder {self.data} of measured data")
+        if self.data is not None and not any((self.data / name).is_file() for name in FILES):
+            raise RftsimError(f"{self.data} has no measured data: it needs one or more of {', '.join(FILES)}")
         pictures = [picture_in(self.plot, name) for name in names]
         for name in names:
             remembered_in(self.memory, name)
@@ -126,7 +129,8 @@ def _print(found: "list[Finished]", pictures: list[Path]) -> None:
     rows = [row for one in found for row in one.rows]
     failed = [f"{one.name}: {row.what}" for one in found for row in one.rows if row.passed is False]
     judged = sum(row.passed is not None for row in rows)
-    print_line(console, f"{judged - len(failed)} of {judged} rows pass")
+    passing = f"{judged - len(failed)} of {judged} rows pass"
+    print_line(console, passing if judged else "no row could be judged: nothing was compared")
     for text in failed:
         print_line(console, f"[bold red]FAIL[/bold red] {escape(text)}")
     if pictures:

@@ -1,16 +1,19 @@
 """Coefficients of a straight law with 95 % intervals: linear least squares, and a bootstrap beside it."""
 
+import warnings
 from typing import Final, NamedTuple
 
 import numpy as np
 
-from rftsim.errors import RftsimError
+from rftsim.errors import RftsimError, RftsimWarning
 from rftsim.surface.triangles import Array
 
 CONFIDENCE: Final = 0.95
 """Probability with which an interval holds its coefficient."""
 DRAWS: Final = 2000
 """Samples that the bootstrap draws."""
+PARTS: Final = 1000
+"""Most parts that the bootstrap draws from; more rows or tests are dealt into so many, which err alike."""
 
 
 class Estimate(NamedTuple):
@@ -42,12 +45,22 @@ def estimate(columns: Array, y: Array, tests: Array | None = None, *, draws: int
         draws: Samples that the bootstrap draws; 0 for none.
 
     Raises:
-        RftsimError: There are too few rows.
+        RftsimError: There are too few rows that differ, or they do not tell the coefficients apart.
     """
     n, p = columns.shape
-    if n <= p:
-        raise RftsimError(f"{n} rows are too few for {p} coefficients and their intervals: give {p + 1} or more")
-    c, *_ = np.linalg.lstsq(columns, y)
+    unlike = len(np.unique(np.column_stack([columns, y]), axis=0))
+    if unlike <= p:
+        rows = f"{n} rows" if unlike == n else f"{n} rows, of which {unlike} differ,"
+        raise RftsimError(f"{rows} are too few for {p} coefficients and their intervals: give {p + 1} or more")
+    if unlike < n:
+        warnings.warn(
+            f"{n - unlike} of {n} rows repeat another: the intervals take them for readings of their own",
+            RftsimWarning,
+            stacklevel=2,
+        )
+    c, _, rank, _ = np.linalg.lstsq(columns, y)
+    if rank < p:
+        raise RftsimError(f"the rows do not tell {p} coefficients apart: vary what the force depends on")
     variance = ((y - columns @ c) ** 2).sum() / (n - p)
     from scipy.stats import t  # not before it is needed: it takes a second
 
@@ -61,10 +74,13 @@ def _bootstrap(columns: Array, y: Array, tests: Array, draws: int) -> tuple[Arra
     """Ends of the intervals of the coefficients that samples with replacement have, (p,) both."""
     rng = np.random.default_rng(0)
     names, which = np.unique(tests, return_inverse=True)
-    parts = [columns[which == k] for k in range(len(names))]
-    squares = np.array([part.T @ part for part in parts])
-    products = np.array([part.T @ y[which == k] for k, part in enumerate(parts)])
-    counts = rng.multinomial(len(names), np.full(len(names), 1.0 / len(names)), size=draws)
+    if len(names) > PARTS:
+        which = (rng.permutation(len(names)) % PARTS)[which]
+    count = min(len(names), PARTS)
+    squares, products = np.zeros((count, *2 * columns.shape[1:])), np.zeros((count, columns.shape[1]))
+    np.add.at(squares, which, columns[:, :, None] * columns[:, None, :])
+    np.add.at(products, which, columns * y[:, None])
+    counts = rng.multinomial(count, np.full(count, 1.0 / count), size=draws)
     left, right = np.tensordot(counts, squares, 1), counts @ products
     regular = np.linalg.cond(left) < 1e12 if draws else np.zeros(0, bool)
     if not regular.any():

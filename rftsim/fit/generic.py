@@ -95,6 +95,7 @@ def _by_plate(faces: Faces, values: Array, count: int) -> Array:
     return found
 
 
+@lru_cache(maxsize=1)
 def reference_grid() -> Plates:
     """The source's plates, [Agarwal] section 5.7: 13 x 13 x 7 angles in steps of 15 degrees; without forces."""
     angles = np.array([*itertools.product(range(-90, 91, 15), range(-90, 91, 15), range(0, 91, 15))], dtype=float)

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from rftsim.errors import RftsimError
 from rftsim.fit.columns import read_columns
@@ -115,14 +116,15 @@ def leading_faces(plates: Plates) -> Faces:
     return Faces(row[leading], normal[leading], v[row][leading], weight[leading])
 
 
-def at_unit_depth(normal: Array) -> Surface:
-    """A surface of one triangle for each normal, shape (k, 3), with its centre a metre deep."""
+def at_unit_depth(normal: Array, where: ArrayLike = (0.0, 0.0, 0.0)) -> Surface:
+    """A surface of one triangle for each normal, shape (k, 3), with its centre a metre below `where`, (k, 3)."""
     aside = np.where(np.abs(normal[:, :1]) < 0.9, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
     a = np.cross(normal, aside)
     a /= np.linalg.norm(a, axis=1, keepdims=True)
     b = np.cross(normal, a)
     corners = [np.cos(t) * a + np.sin(t) * b for t in 2.0 * np.pi / 3.0 * np.arange(3)]
-    return Surface(np.stack(corners, axis=1) - np.array([0.0, 0.0, 1.0]))
+    centres = np.broadcast_to(where, normal.shape) - np.array([0.0, 0.0, 1.0])
+    return Surface(np.stack(corners, axis=1) + centres[:, None, :])
 
 
 def read_csv(path: Path) -> Plates:

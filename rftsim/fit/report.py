@@ -1,10 +1,12 @@
 """The worth of a fitted table: residuals, error on plates that were held back, the source's table beside it."""
 
 import dataclasses
+from collections.abc import Iterator
 from typing import Final, NamedTuple
 
 import numpy as np
 
+from rftsim.errors import RftsimError
 from rftsim.fit.dissipation import FINE_DEG, largest_power
 from rftsim.fit.generic import SOURCE, Generic, Settings, coefficients, determined, fit, nearest
 from rftsim.fit.plates import Plates, at_unit_depth, directions, leading_faces
@@ -16,6 +18,10 @@ from rftsim.surface.triangles import EDGE_ON_DOUBLE, Array
 
 FOLDS: Final = 10
 """Parts of the plates that are held back, one after another."""
+MOST: Final = 10_000
+"""Most plates that are fitted at once."""
+FEW: Final = 1500
+"""Number of plates, drawn at random, by which the prior's weight is chosen where there are more."""
 PRIORS: Final = (0.0, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
 """Weights among which the prior is chosen [plates]."""
 
@@ -120,13 +126,23 @@ def report(plates: Plates, settings: Settings, mu_surf: float, choose_prior: boo
         choose_prior: Take from PRIORS the one with which held-back plates are predicted best.
 
     Raises:
-        RftsimError: See `fit`.
+        RftsimError: There are too many plates, or see `fit`.
     """
-    rank, settings = determined(plates, settings), dataclasses.replace(settings, mu_surf=mu_surf)
+    if plates.n > MOST:
+        raise RftsimError(f"{plates.n} plates are more than the {MOST} that are fitted at once: take means, or fewer")
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(1, user_api="blas"):  # thousands of small problems, whose threads would wait for each other
+        return _report(plates, dataclasses.replace(settings, mu_surf=mu_surf), choose_prior)
+
+
+def _report(plates: Plates, settings: Settings, choose_prior: bool) -> Report:
+    rank, mu_surf = determined(plates, settings), settings.mu_surf
     if choose_prior:
         free = dataclasses.replace(settings, dissipative=False)
         tried = [dataclasses.replace(free, prior=w) for w in PRIORS if w > 0.0 or rank == settings.unknowns]
-        missed = [((held_back(plates, one) - plates.alpha) ** 2).sum() for one in tried]
+        some = plates.take(np.random.default_rng(0).permutation(plates.n)[:FEW])
+        missed = [((held_back(some, one) - some.alpha) ** 2).sum() for one in tried]
         settings = dataclasses.replace(settings, prior=tried[int(np.argmin(missed))].prior)
     generic = fit(plates, settings)
     return Report(
@@ -172,9 +188,30 @@ def predict(table: tuple[Term, ...], xi_n: float, mu_surf: float, plates: Plates
     law, sand = fitted_law(table), Sand(xi_n=xi_n, mu_surf=min(mu_surf, 1e9))
     faces = leading_faces(plates)
     alpha = np.zeros((plates.n, 3))
-    motions, which = np.unique(faces.motion, axis=0, return_inverse=True)
-    for k, motion in enumerate(motions):
-        own = which == k
-        stress = surface_force(at_unit_depth(faces.normal[own]), sand, law, velocity=motion).stress
+    for own, where, velocity, omega in _spins(faces.motion):
+        surface = at_unit_depth(faces.normal[own], where)
+        stress = surface_force(surface, sand, law, velocity=velocity, angular_velocity=omega).stress
         np.add.at(alpha, faces.row[own], faces.weight[own, None] * stress)
     return alpha
+
+
+def _spins(motion: Array) -> Iterator[tuple[Array, Array, Array, Array]]:
+    """Rigid motions by which faces in the right places move in directions of their own, so that one call serves many.
+
+    A spin about y moves the points of the plane z = -1 by (1, 0, -x), and one about z those with x = 0 by (-y, 0,
+    -1) or (-y, 0, 1): every direction of the x-z plane but those backwards, which no plate has.
+
+    Args:
+        motion: Directions of motion, shape (k, 3).
+
+    Yields:
+        Which faces, their places beside the origin (n, 3), the velocity of the origin and the spin.
+    """
+    x, z = motion[:, 0], motion[:, 2]
+    level = x >= np.abs(z)
+    for own, side in ((level, 0.0), (~level & (z < 0.0), -1.0), (~level & (z > 0.0), 1.0)):
+        if own.any():
+            where = np.zeros((int(own.sum()), 3))
+            where[:, 1 if side else 0] = -x[own] / np.abs(z[own]) if side else -z[own] / x[own]
+            spin, velocity = ((0.0, 0.0, 1.0), (0.0, 0.0, side)) if side else ((0.0, 1.0, 0.0), (2.0, 0.0, 0.0))
+            yield own, where, np.array(velocity), np.array(spin)

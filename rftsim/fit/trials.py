@@ -1,5 +1,6 @@
 """A sand's parameters from trials of a plate: pushed down, dragged, slid."""
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -68,7 +69,7 @@ def dragged(path: Path, area: float | None, rho_c: float) -> Found:
         area: Area of the plate [m^2], where there is no such column.
         rho_c: Density of the sand [kg/m^3].
     """
-    if not rho_c > 0.0:
+    if not 0.0 < rho_c < math.inf:
         raise RftsimError(f"lambda is told by the sand's density: rho_c must be positive, not {rho_c:g} (--rho-c)")
     table = _read(path, ("depth", "speed", "force"), area)
     plate = table["area"]
@@ -121,7 +122,7 @@ def slid(path: Path) -> Found:
 
 def _read(path: Path, needed: tuple[str, ...], area: float | None) -> dict[str, Array]:
     """Columns of a test, with the plate's area in each row."""
-    if area is not None and not area > 0.0:
+    if area is not None and not 0.0 < area < math.inf:
         raise RftsimError(f"area must be positive, not {area:g}")
     table = read_columns(path, needed if area is not None else (*needed, "area"), ("test",))
     table.setdefault("area", np.full(len(table["force"]), area))

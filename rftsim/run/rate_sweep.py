@@ -1,9 +1,11 @@
 """The wheel and the runner of [Agarwal] chapter 4 over their imposed rates, under four laws: `rftsim demo`."""
 
 import concurrent.futures
+import contextlib
 import math
 import multiprocessing
-from collections.abc import Callable
+import signal
+from collections.abc import Callable, Iterator
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -70,12 +72,23 @@ def measure(scene: str, law: str, rpm: float, sand: str | None = None) -> Point:
     )
 
 
+@contextlib.contextmanager
+def _deaf_children() -> Iterator[None]:
+    """Let processes that are started in the block not hear Ctrl-C, which the terminal sends to each: ours ends them."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def measure_all(processes: int, report: Callable[[Point], None]) -> list[Point]:
     """Run every point of the demonstration, `processes` at a time; `report` is called with each as it ends."""
     context = multiprocessing.get_context("spawn")
     jobs = points()
     with concurrent.futures.ProcessPoolExecutor(processes, mp_context=context) as pool:
-        futures = {pool.submit(measure, *job): job for job in jobs}
+        with _deaf_children():
+            futures = {pool.submit(measure, *job): job for job in jobs}
         done = {}
         try:
             for future in concurrent.futures.as_completed(futures):

@@ -119,6 +119,11 @@ FILE_START: Final = Start(settle=True)
 FILE_DURATION: Final = 4.0
 """How long model files run where nothing else is asked for [s]."""
 
+MOST_STEPS: Final = 1e9
+"""Most time steps of a run; a thousand million take hours at the least."""
+LEAST_STEP: Final = 1e-9
+"""Least time step [s]; shorter ones are lost in the rounding of time."""
+
 SCENES: Final[Mapping[str, Scene]] = {
     "grouser-wheel": _wheel_scene(
         "[Agarwal] Table 4.1: grousered wheel on a gravity-compensated carriage, 4 N forward, rate imposed",
@@ -191,10 +196,12 @@ def stage(
     else:
         spec, wheel = _built(name, scene, _chosen(name, scene.settings, settings or {}))
         options = {**WHOLE, **options}
-    _check_positive("timestep", timestep)
-    _check_positive("duration", duration)
     if timestep is not None:
         spec.option.timestep = timestep
+    _check_positive("duration", duration)
+    _check_positive("timestep", spec.option.timestep)
+    if spec.option.timestep < LEAST_STEP:
+        raise SceneError(f"the timestep must be {LEAST_STEP:g} s or more, not {spec.option.timestep:g} s")
     if wheel is not None:
         options.setdefault("max_edge", 2 * wheel.width)  # as fine as the outline was asked to be
         if scene is not None and scene.structural:
@@ -210,6 +217,8 @@ def stage(
     else:
         measured = Measured(wheels.WHEEL, wheel.outer_radius)
     duration = duration or (scene.duration if scene else FILE_DURATION)
+    if duration > MOST_STEPS * model.opt.timestep:
+        raise SceneError(f"{duration:g} s are more than {MOST_STEPS:g} time steps of {model.opt.timestep:g} s")
     return Staged(model, bed, measured, duration, Start() if scene else start)
 
 
@@ -232,7 +241,7 @@ def _built(name: str, scene: Scene, chosen: Settings) -> tuple[mujoco.MjSpec, wh
 
 def _check_positive(label: str, value: float | None) -> None:
     if value is not None and not 0.0 < value < float("inf"):
-        raise SceneError(f"the {label} must be positive, not {value}")
+        raise SceneError(f"the {label} must be positive, not {value:g} s")
 
 
 def _chosen(name: str, defaults: Settings, changes: Mapping[str, str]) -> Settings:

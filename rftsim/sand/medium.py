@@ -60,6 +60,8 @@ class Sand:
             value = getattr(self, field.name)
             if value is None and field.default is not None:
                 raise SandError(f"{field.name} must be a number, not None")
+            if field.name == "source" and not isinstance(value, str):
+                raise SandError(f"source must be text, not {value!r}")
             if field.name != "source" and value is not None:
                 object.__setattr__(self, field.name, finite(field.name, value))
         for field in dataclasses.fields(self):
@@ -159,12 +161,27 @@ def finite(name: str, value: object) -> float:
         SandError: It is no number, or not finite.
     """
     try:
+        if isinstance(value, bool):
+            raise TypeError
         found = float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError):
         raise SandError(f"{name} must be a number, not {value!r}") from None
+    except OverflowError:
+        raise SandError(f"{name} must be finite, not a whole number of so many digits") from None
     if not math.isfinite(found):
         raise SandError(f"{name} must be finite, not {found}")
     return found
+
+
+def check_parameter(name: str, value: object) -> None:
+    """Refuse a value of a parameter that no sand has; None is unknown, and may be.
+
+    Raises:
+        SandError: It is no finite number, or outside the parameter's bounds.
+    """
+    if value is not None:
+        (field,) = (field for field in dataclasses.fields(Sand) if field.name == name)
+        check_bounds(field, finite(name, value))
 
 
 def check_bounds(field: "dataclasses.Field[Any]", value: float | None) -> None:

@@ -1,12 +1,12 @@
 """Named sands, and sand from whatever names it."""
 
 import dataclasses
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
 from rftsim.errors import SandError
+from rftsim.files import read_toml
 from rftsim.sand.medium import PARAMETERS, Sand, check_known, finite
 from rftsim.sand.strength import GRAVITY, xi_n_cubic
 
@@ -87,7 +87,7 @@ def read_parameters(text: str) -> dict[str, Any]:
             raise SandError(f"{repeated[0]!r} is given twice in the sand {text!r}")
         return dict(pairs)
     if text.endswith(".toml"):
-        return _read_toml(Path(text))
+        return _read_sand(Path(text))
     raise SandError(f"no sand {text!r}; presets are {', '.join(PRESETS)}; or give key=value,... or a .toml file")
 
 
@@ -98,14 +98,12 @@ def _pair(item: str) -> tuple[str, str]:
     return key.strip(), value.strip()
 
 
-def _read_toml(path: Path) -> dict[str, Any]:
-    try:
-        table = tomllib.loads(path.read_text())
-    except OSError as error:
-        raise SandError(f"cannot read the sand file {path}: {error.strerror}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise SandError(f"the sand file {path} is not TOML: {error}") from None
-    return dict(table.get("sand", table))
+def _read_sand(path: Path) -> dict[str, Any]:
+    text = read_toml(path, "sand")
+    table = text.get("sand", text)
+    if not isinstance(table, dict):
+        raise SandError(f"the sand file {path} has sand = {table!r}; it needs a table [sand], or its parameters alone")
+    return dict(table)
 
 
 def _from_mapping(parameters: dict[str, Any]) -> Sand:

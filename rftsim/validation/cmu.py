@@ -16,6 +16,9 @@ PLATE_FILE: Final = "cmu_circular_plate_sinkage.csv"
 SMOOTH_FILE: Final = "cmu_wheel_smooth.csv"
 """A smooth wheel in the same sand, of the same columns; not among the data that come with the grousered one."""
 
+FILES: Final = (WHEEL_FILE, PLATE_FILE, SMOOTH_FILE)
+"""The files of measurements that are looked for."""
+
 
 class Runs(NamedTuple):
     """Measured runs of a wheel, a value for each; shape (n,) unless said."""

@@ -74,9 +74,8 @@ def test_a_study_that_was_stopped_goes_on(capsys, tmp_path, monkeypatch):
 
     with monkeypatch.context() as patch:
         patch.setattr(plates, "oblique", stop)
-        with pytest.raises(KeyboardInterrupt):
-            main(["validate", "plates", "--json", "--memory", str(tmp_path)])
-    capsys.readouterr()
+        code, out, err = call(capsys, "plates", "--json", "--memory", tmp_path)
+    assert (code, out, err) == (130, "", "stopped\n")
     monkeypatch.setattr(plates, "drag", stop)
     assert call(capsys, "plates", "--json", "--memory", tmp_path)[0] == 0
 
@@ -104,11 +103,20 @@ def test_help_has_an_example(capsys):
     assert "Example: rftsim validate" in " ".join(out.split())
 
 
-def test_absent_data_are_said_and_do_not_fail(capsys, tmp_path):
-    code, out, _ = call(capsys, "measured", "--data", tmp_path, "--memory", tmp_path / "m", "--plot", tmp_path)
+def test_absent_data_are_said_and_do_not_fail(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    code, out, _ = call(capsys, "measured", "--memory", tmp_path / "m", "--plot", tmp_path)
     assert code == 0
     assert out.count("data not here") == 2
+    assert "nothing was compared" in out
     assert (tmp_path / "measured.png").is_file()
+
+
+def test_a_folder_without_data_is_refused(capsys, tmp_path):
+    code, out, err = call(capsys, "measured", "--data", tmp_path, "--memory", tmp_path / "m")
+    assert (code, out) == (2, "")
+    assert f"{tmp_path} has no measured data" in err
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_failing_row_is_marked_and_ends_with_1(capsys, tmp_path):

@@ -167,13 +167,19 @@ class Folder:
                 raise TrainingError(f"another process trains in {self.path}") from None
             except OSError as error:
                 raise TrainingError(f"cannot write to {self.path}: {error.strerror}") from error
-            self._claim(plan)
+            self.check(plan)
+            if not self.exists:
+                self.write_config(plan, done=False)
             yield
 
-    def _claim(self, plan: Plan) -> None:
+    def check(self, plan: Plan) -> None:
+        """Refuse a folder in which another run was begun; versions that changed since are warned about.
+
+        Raises:
+            TrainingError: Another run was begun here, or its config.json cannot be read.
+        """
         asked = plan.as_json()
         if not self.exists:
-            self.write_config(plan, done=False)
             return
         kept = self._read()
         differing = [

@@ -22,7 +22,7 @@ from rftsim_envs.recipe import Training, TrainingError
 from rftsim_envs.sb3 import SandVecEnv
 from rftsim_envs.training.folder import Folder, Plan, Progress, write_whole
 
-EVERY_SECONDS: Final = 30.0
+EVERY_SECONDS: Final = 5.0
 """Time after which an update is followed by a checkpoint [s]."""
 EVERY_STEPS: Final = 50_000
 """Number of control steps after which an update is followed by a checkpoint."""
@@ -76,12 +76,14 @@ def train(
         TrainingError: The folder belongs to another plan or to another process, or it cannot be written.
     """
     folder = Folder(path)
+    updates, total = plan.training.updates(), sum(plan.training.updates()) * plan.training.n_envs
+    if folder.done:
+        folder.check(plan)
+        return Trained(total, total, True)
+    env = SandVecEnv(plan.task, plan.training.n_envs, threads, **plan.settings)
+    model = make_model(plan.training, env, plan.seed)  # what cannot be is refused before anything is written
     with folder.opened(plan):
-        updates, total = plan.training.updates(), sum(plan.training.updates()) * plan.training.n_envs
-        if folder.done:
-            return Trained(total, total, True)
-        env = SandVecEnv(plan.task, plan.training.n_envs, threads, **plan.settings)
-        run = _Run(plan, env, folder, tensorboard)
+        run = _Run(plan, env, model, folder, tensorboard)
         began = run.resume()
         done = run.carry_on(updates, report, stop)
         run.save()
@@ -115,9 +117,9 @@ def make_model(training: Training, env: SandVecEnv, seed: int) -> PPO:
 class _Run:
     """A run between two checkpoints."""
 
-    def __init__(self, plan: Plan, env: SandVecEnv, folder: Folder, tensorboard: bool) -> None:
+    def __init__(self, plan: Plan, env: SandVecEnv, model: PPO, folder: Folder, tensorboard: bool) -> None:
         self.env, self.folder, self.updates, self.steps = env, folder, 0, 0
-        self.model = make_model(plan.training, env, plan.seed)
+        self.model = model
         formats: list[KVWriter] = [TensorBoardOutputFormat(str(folder.tensorboard))] if tensorboard else []
         self.model.set_logger(Logger(None, formats))
         self._rate, self._callback = plan.training.learning_rate, _Callback()
