@@ -1,7 +1,8 @@
 """A plugin instance: which bodies feel its sand, where their numbers lie in the model, and what it remembers.
 
 The numbers are found by name. A numeric is a body's surface, or a bed's parameters, where its name without the marker
-is the body's, or the instance's, name; so MJCF attachment may put any prefix and suffix around both.
+is the body's, or the instance's, name; so MJCF attachment may put any prefix and suffix around both. They are checked
+when the block is made, see `checks`; where they lie and how many they are is kept, and not read from the model again.
 
 What belongs to an mjData (`plugin_data` is its number in the registry) is one block: a record of BLOCK_HEAD, one of
 MEMBER for each body, each body's last wrench (WRENCH numbers), what was left in MuJoCo's cfrc_ext for each (as many), a
@@ -14,6 +15,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from rftsim.errors import SceneError
 from rftsim.law.layout import WRENCH
 from rftsim.machine import registry
 from rftsim.machine.kernel import exact_kernel
@@ -21,11 +23,22 @@ from rftsim.machine.kernel import exact_kernel
 CHUNK: Final = 500
 """Numbers of one numeric: MuJoCo's XML reader takes no more. A surface goes on in the numerics behind its first."""
 BODY_MARKER: Final = "rftsim-body:"
+MORE_MARKER: Final = "rftsim-body-"
+"""Instead of BODY_MARKER, with the numeric's number and a colon behind it, where a surface goes on."""
 SAND_MARKER: Final = "rftsim-sand:"
-BLOCK_HEAD: Final = np.dtype([("nbody", "i8"), ("bed", "i8")])
-"""Number of bodies, and the numeric of the bed."""
-MEMBER: Final = np.dtype([("body", "i8"), ("numeric", "i8")])
-"""A body's id, and the numeric of its surface."""
+BLOCK_HEAD: Final = np.dtype(
+    [(name, "i8") for name in ("nbody", "bed", "bed_sum", "state", "state_size", "has_complained")]
+)
+"""Number of bodies; the bed's place in numeric_data, and the sum of its sealed numbers' bits; address and size of the
+state that lasts; whether it was said that the numbers were changed."""
+MEMBER: Final = np.dtype(
+    [
+        *((name, "i8") for name in ("body", "start", "size", "sum", "header_sum", "looked_at", "sum_so_far")),
+        *((name, "f8") for name in ("ntri", "wheel_radius")),
+    ]
+)
+"""A body's id; its surface's place in numeric_data, how many numbers it has, the sum of their bits and of its header's;
+how many were looked at since the sum was last compared, and their sum; what the size follows from, of its header."""
 COUNTERS: Final = np.dtype(
     [
         *((name, "f8") for name in ("evaluations", "derivatives", "unsolved")),
@@ -74,9 +87,15 @@ class Block(NamedTuple):
     """Record of COUNTERS."""
 
 
-def read_block(number: int, owner: int, instance: int) -> Block:
-    """The block of an instance in the mjData at `owner` whose plugin data is `number`."""
-    address = registry.read_address(number, owner, instance)
+def read_block(numbers: Any, owner: int, instance: int) -> Block:
+    """The block of an instance in the mjData at `owner` whose plugin data is `numbers`.
+
+    Raises:
+        SceneError: The data has none: it was made of another model.
+    """
+    address = registry.read_address(int(numbers[instance]), owner, instance) if instance < len(numbers) else 0
+    if address == 0:
+        raise SceneError("the data holds nothing of the model's sand: make it with mujoco.MjData(model), and step it")
     n = int(_view(address, BLOCK_HEAD, 1)[0]["nbody"])
     members = _view(address + _HEAD, MEMBER, n)
     wrenches = _view(address + wrenches_start(n), np.dtype("f8"), WRENCH * n).reshape(n, WRENCH)
