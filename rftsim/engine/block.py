@@ -27,18 +27,21 @@ MORE_MARKER: Final = "rftsim-body-"
 """Instead of BODY_MARKER, with the numeric's number and a colon behind it, where a surface goes on."""
 SAND_MARKER: Final = "rftsim-sand:"
 BLOCK_HEAD: Final = np.dtype(
-    [(name, "i8") for name in ("nbody", "bed", "bed_sum", "state", "state_size", "has_complained")]
-)
-"""Number of bodies; the bed's place in numeric_data, and the sum of its sealed numbers' bits; address and size of the
-state that lasts; whether it was said that the numbers were changed."""
-MEMBER: Final = np.dtype(
     [
-        *((name, "i8") for name in ("body", "start", "size", "sum", "header_sum", "looked_at", "sum_so_far")),
-        *((name, "f8") for name in ("ntri", "wheel_radius")),
+        *((name, "i8") for name in ("nbody", "bed", "state", "state_size", "has_complained")),
+        ("bed_weight", "f8"),
     ]
 )
-"""A body's id; its surface's place in numeric_data, how many numbers it has, the sum of their bits and of its header's;
-how many were looked at since the sum was last compared, and their sum; what the size follows from, of its header."""
+"""Number of bodies; the bed's place in numeric_data; address and size of the state that lasts; whether it was said that
+the numbers were changed; the weight of the bed's sealed numbers, see `checks`."""
+MEMBER: Final = np.dtype(
+    [
+        *((name, "i8") for name in ("body", "start", "size", "looked_at")),
+        *((name, "f8") for name in ("weight", "header_weight", "weight_so_far", "ntri", "wheel_radius")),
+    ]
+)
+"""A body's id; its surface's place in numeric_data, and how many numbers it has; how many were looked at since their
+weight was last compared; their weight and that of the header; that of those looked at; what the size follows from."""
 COUNTERS: Final = np.dtype(
     [
         *((name, "f8") for name in ("evaluations", "derivatives", "unsolved")),

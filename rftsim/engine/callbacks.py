@@ -4,7 +4,19 @@ from typing import Final
 
 from numba import types
 
-from rftsim.engine import bodies, explicit, external, implicit, instance, offsets, reactions, sensors
+from rftsim.engine import (
+    bodies,
+    checks,
+    explicit,
+    external,
+    implicit,
+    instance,
+    making,
+    offsets,
+    reactions,
+    sensors,
+    sound,
+)
 from rftsim.engine.layout import CONSTANTS
 from rftsim.engine.refusals import WHY
 from rftsim.law.layout import WRENCH
@@ -42,14 +54,20 @@ def nsensordata(m, number, sensor):
 def make_block(m, d, number):
     """Make the block of an instance; what is wrong, and where the name of that stands, see `instance.REASONS`."""
     model, data = offsets.model(), offsets.data()
-    why, name = instance.initialise(model, data, m, d, number)
+    why, name = making.initialise(model, data, m, d, number)
     return why + instance.REASONS * (name - pointer(m + model.names))
 
 
 @entry(types.intc, address, address, types.intp)
 def is_sound(m, block, state_size):
     """Whether the model still has what was checked of it when a block was made, for a force with a state of a size."""
-    return 1 if instance.find_sound(offsets.model(), m, block, state_size) else 0
+    return 1 if sound.is_sound(offsets.model(), m, block, state_size) else 0
+
+
+@entry(types.void, address, types.intp, address)
+def weigh(numbers, size, out):
+    """Fill out with the weight of so many numbers, (1,), always by the same instructions and so the same to the bit."""
+    doubles(out, 1)[0] = checks.weigh(numbers, size)
 
 
 @inline

@@ -1,4 +1,4 @@
-"""What is checked of a model's numbers: all when an instance is made, and at each step what compiled code relies on."""
+"""Checks of a model's numbers: of all when an instance is made, and at each step of what compiled code relies on."""
 
 import numpy as np
 
@@ -11,25 +11,30 @@ from rftsim.engine.seal import (
     COUNTS,
     FACTOR,
     LARGEST,
+    LONGEST,
     PARAMETERS,
+    REST,
     SEAL,
     SEAL_NUMBERS,
     SEALED,
     STEP,
+    TINY,
     TOLERANCES,
+    WEIGHED,
+    WEIGHTS,
 )
 from rftsim.law.body import bed_at, header_at
 from rftsim.law.layout import BOX_NUMBERS, COLUMNS, HEADER_NUMBERS, WRENCH, packed_size
 from rftsim.machine.compiling import exact, inline, loop
-from rftsim.machine.memory import doubles, int32s, int64s, pointer, uint64s
+from rftsim.machine.memory import doubles, int32s, pointer, uint64s
 from rftsim.machine.records import record_at
 
 _BODY, _SAND = BODY_MARKER.encode(), SAND_MARKER.encode()
 _STEP, _FACTOR = np.uint64(STEP), np.uint64(FACTOR)
 _HALF, _PART, _PIECE = np.uint64(32), np.uint64(29), np.uint64(16)
-_MASK, _MINUS_ZERO, _NOTHING = np.uint64(0xFFFF), np.uint64(1 << 63), np.uint64(0)
+_MASK, _NOTHING = np.uint64(0xFFFF), np.uint64(0)
 _FIRST, _LAST = PARAMETERS[0], PARAMETERS[-1] + 1
-_SEALED = len(SEALED)
+_SEALED, _REST = len(SEALED), len(REST)
 _SMALLEST = HEADER_NUMBERS + COLUMNS + BOX_NUMBERS
 _UNIT = 1e-5
 """How far the square of a unit vector may be from one: MuJoCo prints six digits."""
@@ -46,9 +51,15 @@ def _mixed(word, key):
 
 @inline
 def _add(total, key, word):
-    """A digest after one word more, and the key of that word; zero counts as its negative does."""
+    """A digest after one word more, and the key of that word."""
     key = key + _STEP
-    return total + _mixed(_NOTHING if word == _MINUS_ZERO else word, key), key
+    return total + _mixed(word, key), key
+
+
+@inline
+def _word(numbers, words, k):
+    """The bits of the k-th number."""
+    return _NOTHING if abs(numbers[k]) < TINY else words[k]
 
 
 @exact
@@ -75,18 +86,19 @@ def _is_sealed(seal, digest):
 @inline
 def _length(seal):
     """Characters of an owner's name; none where that is no such number."""
-    return int(seal.length) if 0.0 <= seal.length < 4096.0 else 0
+    return int(seal.length) if 0.0 <= seal.length < LONGEST else 0
 
 
 @exact
 def find(model, m, marker, owner):
-    """The numeric whose name is that at `owner` with a marker in it, and where that stands; -1 where there is none."""
+    """The numeric whose name is that at `owner` with a marker in it, that name, and where the marker stands; or -1."""
     text, count = names.text(model, m), pointer(m + model.nnumeric)
     for i in range(count):
-        start = names.marked(text, names.start_of(model, m, model.name_numericadr, count, i), marker, owner)
-        if start >= 0:
-            return i, start
-    return -1, -1
+        name = names.start_of(model, m, model.name_numericadr, count, i)
+        at = names.marked(text, name, marker, owner, 0)
+        if at >= 0:
+            return i, name, at
+    return -1, -1, -1
 
 
 @exact
@@ -121,19 +133,21 @@ def check_bed(model, m, owner):
     Returns:
         Its place in numeric_data, where its own name starts, and what is wrong with it, see WHY.
     """
-    numeric, at = find(model, m, _SAND, owner)
+    numeric, name, at = find(model, m, _SAND, owner)
     start, size = _range(model, m, numeric)
     if size != BED_NUMBERS + SEAL_NUMBERS:
         return -1, owner, WHY.bed
-    bed = pointer(m + model.numeric_data) + 8 * start
-    seal, words = _seal_at(bed + 8 * BED_NUMBERS), uint64s(bed, BED_NUMBERS)
+    bed, text = pointer(m + model.numeric_data) + 8 * start, names.text(model, m)
+    seal, numbers, words = _seal_at(bed + 8 * BED_NUMBERS), doubles(bed, BED_NUMBERS), uint64s(bed, BED_NUMBERS)
     total, key = _NOTHING, _NOTHING
     for k in range(_SEALED):
-        total, key = _add(total, key, words[SEALED[k]])
-    total, key = _add_text(total, key, names.text(model, m), owner + at, _length(seal))
-    if not _is_sealed(seal, total):
-        return -1, owner, WHY.bed
-    return start, owner + at, WHY.none if is_within(bed) else WHY.bounds
+        total, key = _add(total, key, _word(numbers, words, SEALED[k]))
+    while at >= 0:
+        whole, _ = _add_text(total, key, text, owner + at, _length(seal))
+        if _is_sealed(seal, whole):
+            return start, owner + at, WHY.none if is_within(bed) else WHY.bounds
+        at = names.marked(text, name, _SAND, owner, at + 1)
+    return -1, owner, WHY.bed
 
 
 @exact
@@ -146,15 +160,22 @@ def _total(address, end):
 
 
 @exact
-def _is_whole(model, m, owner, numeric, at, start, total):
-    """Whether the numerics from one on are those of a surface of so many numbers, one behind another."""
-    text, count = names.text(model, m), pointer(m + model.nnumeric)
+def _is_whole(model, m, numeric, start, total):
+    """Whether so many numbers lie in the numerics from one on, one behind another."""
     for k in range((total + CHUNK - 1) // CHUNK):
         where, size = _range(model, m, numeric + k)
         if where != start + CHUNK * k or size != min(CHUNK, total - CHUNK * k):
             return False
+    return True
+
+
+@exact
+def _goes_on(model, m, owner, numeric, at, total):
+    """Whether those numerics have the names of a surface whose marker stands at a place of its owner's name."""
+    text, count = names.text(model, m), pointer(m + model.nnumeric)
+    for k in range(1, (total + CHUNK - 1) // CHUNK):
         name = names.start_of(model, m, model.name_numericadr, count, numeric + k)
-        if k > 0 and not names.goes_on(text, name, owner, at, k):
+        if not names.goes_on(text, name, owner, at, k):
             return False
     return True
 
@@ -170,24 +191,28 @@ def check_surface(model, m, owner, bed, bed_name):
         bed: Place of the bed in numeric_data.
         bed_name: Where the bed's own name starts.
     """
-    numeric, at = find(model, m, _BODY, owner)
+    numeric, name, at = find(model, m, _BODY, owner)
     start, size = _range(model, m, numeric)
     if size < _SMALLEST:
         return -1, 0
-    numbers = pointer(m + model.numeric_data)
+    numbers, text = pointer(m + model.numeric_data), names.text(model, m)
     surface = numbers + 8 * start
     total = _total(surface, pointer(m + model.nnumericdata))
-    if total == 0 or not _is_whole(model, m, owner, numeric, at, start, total):
+    if total == 0 or not _is_whole(model, m, numeric, start, total):
         return -1, 0
     size = total - SEAL_NUMBERS
-    seal, words = _seal_at(surface + 8 * size), uint64s(surface, size)
+    seal, values, words = _seal_at(surface + 8 * size), doubles(surface, size), uint64s(surface, size)
     digest, key = _NOTHING, _NOTHING
     for k in range(size):
-        digest, key = _add(digest, key, words[k])
-    text = names.text(model, m)
-    digest, key = _add_text(digest, key, text, owner + at, _length(seal))
-    digest, key = _add_text(digest, key, text, bed_name, _length(_seal_at(numbers + 8 * (bed + BED_NUMBERS))))
-    return (start, size) if _is_sealed(seal, digest) else (-1, 0)
+        digest, key = _add(digest, key, _word(values, words, k))
+    of_bed = _length(_seal_at(numbers + 8 * (bed + BED_NUMBERS)))
+    while at >= 0:
+        whole, last = _add_text(digest, key, text, owner + at, _length(seal))
+        whole, _ = _add_text(whole, last, text, bed_name, of_bed)
+        if _is_sealed(seal, whole) and _goes_on(model, m, owner, numeric, at, total):
+            return start, size
+        at = names.marked(text, name, _BODY, owner, at + 1)
+    return -1, 0
 
 
 @exact
@@ -197,30 +222,43 @@ def has_surface(model, m, owner):
 
 
 @exact
-def sensors_have_room(model, m, instance):
-    """Whether each sensor of an instance has the numbers of a wrench in sensordata."""
-    n, end = pointer(m + model.nsensor), pointer(m + model.nsensordata)
+def sensors_fit(model, m, instance):
+    """Whether each sensor of an instance has the numbers of a wrench in sensordata, and is of one of its bodies."""
+    n, nbody, end = pointer(m + model.nsensor), pointer(m + model.nbody), pointer(m + model.nsensordata)
     owner, size = int32s(pointer(m + model.sensor_plugin), n), int32s(pointer(m + model.sensor_dim), n)
-    start = int32s(pointer(m + model.sensor_adr), n)
+    start, body = int32s(pointer(m + model.sensor_adr), n), int32s(pointer(m + model.sensor_objid), n)
+    plugins = int32s(pointer(m + model.body_plugin), nbody)
     for i in range(n):
-        if owner[i] == instance and not (size[i] == WRENCH and 0 <= start[i] <= end - WRENCH):
+        if owner[i] != instance:
+            continue
+        if size[i] != WRENCH or not 0 <= start[i] <= end - WRENCH:
+            return False
+        if not 0 <= body[i] < nbody or plugins[body[i]] != instance:
             return False
     return True
 
 
 @loop
-def sum_of(address, size):
-    """The sum of the bits of so many numbers, as integers that wrap round."""
-    total, words = 0, int64s(address, size)
-    for i in range(size):
-        total += words[i]
-    return total
+def weigh(address, size):
+    """The sum of so many numbers, each times a weight of its place, which what is moved or changed does not keep."""
+    total, turn, whole, numbers = 0.0, 0.0, size // WEIGHED, doubles(address, size)
+    for block in range(whole):
+        part = 0.0
+        for k in range(WEIGHED):
+            part += numbers[WEIGHED * block + k] * WEIGHTS[k]
+        total += (1.0 + turn) * part
+        turn += WEIGHTS[1]
+        turn -= 1.0 if turn >= 1.0 else 0.0
+    part = 0.0
+    for k in range(size - WEIGHED * whole):
+        part += numbers[WEIGHED * whole + k] * WEIGHTS[k]
+    return total + (1.0 + turn) * part
 
 
 @exact
-def sealed_sum(bed):
-    """The sum of the bits of the numbers of the bed at an address that nobody may change."""
-    total, words = 0, int64s(bed, BED_NUMBERS)
-    for k in range(_SEALED):
-        total += words[SEALED[k]]
+def weigh_rest(bed):
+    """The same of those numbers of the bed at an address, beside its table, that nobody may change."""
+    total, numbers = 0.0, doubles(bed, BED_NUMBERS)
+    for k in range(_REST):
+        total += numbers[REST[k]] * WEIGHTS[k]
     return total

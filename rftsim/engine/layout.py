@@ -15,6 +15,7 @@ import numpy as np
 from mujoco.introspect import ast_nodes, structs
 
 from rftsim.engine import refusals
+from rftsim.law import layout as law
 
 _SCALARS: dict[str, type[Any]] = {
     "int": ctypes.c_int,
@@ -57,7 +58,7 @@ CONSTANTS: Final = {
     "box": int(mujoco.mjtGeom.mjGEOM_BOX),
 }
 """Those that are compiled in."""
-GIVEN: Final = repr(CONSTANTS)
+GIVEN: Final = repr(CONSTANTS) + law.GIVEN
 """All that machine code of the engine is made from beside its sources."""
 FUNCTIONS: Final = (
     *("mj_fwdActuation", "mj_rne", "mj_referenceConstraint", "mj_isSparse", "mjd_smooth_vel", "mju_rayGeom"),

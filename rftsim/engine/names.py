@@ -28,12 +28,15 @@ def letter(names, i):
 
 
 @exact
-def marked(names, numeric, marker, owner):
-    """Where the marker stands in the name at `numeric`, if that is the name at `owner` with it inserted; else -1."""
+def marked(names, numeric, marker, owner, first):
+    """Where the marker stands in the name at `numeric`, if that is the name at `owner` with it inserted; else -1.
+
+    It may be so in several places, and is looked for from `first` on.
+    """
     same = 0
     while letter(names, numeric + same) != 0 and letter(names, numeric + same) == letter(names, owner + same):
         same += 1
-    for start in range(same + 1):
+    for start in range(first, same + 1):
         k = 0
         while k < len(marker) and letter(names, numeric + start + k) == marker[k]:
             k += 1

@@ -38,7 +38,9 @@ class Refusals(NamedTuple):
         "rftsim's plugin finds a surface of body '%s', which names no plugin and would feel no sand: delete the "
         f"numerics of that name, or {_ANEW}"
     )
-    sensor: str = f"rftsim's plugin finds a sensor on bed '%s' that has no room for a wrench: {_ANEW}"
+    sensor: str = (
+        f"rftsim's plugin finds a sensor on bed '%s' that has no room for a wrench, or names a body out of it: {_ANEW}"
+    )
     memory: str = f"rftsim's plugin has no memory for bed '%s', or more than {PLACES} beds in the data of this process"
     changed: str = (
         "the numbers of bed '%s', of a surface in it, or of its plugin_state were changed to what none can be, so its "

@@ -87,9 +87,10 @@ def _instance(model: mujoco.MjModel, by_name: dict[str, int], instance: int, bod
     numbers = None if marked is None else _numeric(model, by_name[marked])
     if marked is None or numbers is None or numbers.size != seal.BED_NUMBERS + seal.SEAL_NUMBERS:
         raise SceneError(f"the model lacks the numbers of its bed {name!r}: make it anew with rftsim.add_sand")
-    packed = numbers[: seal.BED_NUMBERS]
-    if layout.record(packed, layout.BED).response not in range(seal.ANSWERS):
-        raise SceneError(f"the number of the law of bed {name!r} was changed: it must be below {seal.ANSWERS}")
+    packed, behind = numbers[: seal.BED_NUMBERS], numbers[seal.BED_NUMBERS :]
+    owns = (seal.own_name(name, start, behind) for start in range(len(name) + 1))
+    if not any(seal.is_sealed(packed[seal.SEALED], behind, own) for own in dict.fromkeys(owns)):
+        raise SceneError(f"the law of bed {name!r}, or its numbers' place, was changed: make the model anew")
     return Instance(instance, name, int(model.numeric_adr[by_name[marked]]), packed, bodies)
 
 
@@ -123,10 +124,8 @@ def _surface(model: mujoco.MjModel, by_name: dict[str, int], owner: str) -> Arra
     if first is None:
         return None
     i = by_name[first]
-    start = next(k for k in range(len(owner) + 1) if owner[:k] + BODY_MARKER + owner[k:] == first)
-    before, after, end = owner[:start], owner[start:], i + 1
-    while by_name.get(f"{before}{MORE_MARKER}{end - i}:{after}") == end:
-        end += 1
+    places = [k for k in range(len(owner) + 1) if owner[:k] + BODY_MARKER + owner[k:] == first]
+    end = max(_end(by_name, i, owner[:k], owner[k:]) for k in places)
     start, size = max(int(model.numeric_adr[i]), 0), int(model.numeric_size[i:end].sum())
     numbers: Array = model.numeric_data[start : start + max(size, 0)]
     size = numbers.size - seal.SEAL_NUMBERS
@@ -134,6 +133,14 @@ def _surface(model: mujoco.MjModel, by_name: dict[str, int], owner: str) -> Arra
     if header is None or not 1.0 <= header.ntri <= size or layout.packed_size(header) != size:
         raise SceneError(f"the surface of body {owner!r} was changed in the model: make it anew with rftsim.add_sand")
     return numbers[:size]
+
+
+def _end(by_name: dict[str, int], i: int, before: str, after: str) -> int:
+    """The numeric behind those of a surface that starts at i, with so much of its owner's name on both sides."""
+    end = i + 1
+    while by_name.get(f"{before}{MORE_MARKER}{end - i}:{after}") == end:
+        end += 1
+    return end
 
 
 def wrenches(model: mujoco.MjModel, data: mujoco.MjData) -> Wrenches:
