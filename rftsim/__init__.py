@@ -1,5 +1,6 @@
 """Sand for MuJoCo: granular resistive forces on the bodies of any model."""
 
+from rftsim.engine import pickles as _pickles
 from rftsim.engine import plugin as _plugin
 from rftsim.errors import RftsimError, RftsimNote, RftsimWarning, SandError, SceneError, SurfaceError
 from rftsim.law.laws import LAWS, Law
@@ -15,3 +16,4 @@ from rftsim.surface.triangles import Surface, Wheel, load_surface, make_surface
 
 _plugin.register(_plugin.EXPLICIT)
 _plugin.register(_plugin.IMPLICIT)
+_pickles.register()

@@ -78,7 +78,7 @@ class Meter:
 
     def _spent(self, data: mujoco.MjData) -> Any:
         """The numbers of `rftsim.work`, summed over the beds."""
-        counters = [read_block(int(data.plugin_data[bed]), data._address, bed).counters for bed in self._beds]
+        counters = [read_block(data.plugin_data, data._address, bed).counters for bed in self._beds]
         return np.array([[int(one[name]) for name in _TOTALS] for one in counters]).sum(axis=0)
 
 

@@ -1,7 +1,8 @@
 """A plugin instance: which bodies feel its sand, where their numbers lie in the model, and what it remembers.
 
 The numbers are found by name. A numeric is a body's surface, or a bed's parameters, where its name without the marker
-is the body's, or the instance's, name; so MJCF attachment may put any prefix and suffix around both.
+is the body's, or the instance's, name; so MJCF attachment may put any prefix and suffix around both. They are checked
+when the block is made, see `checks`; where they lie and how many they are is kept, and not read from the model again.
 
 What belongs to an mjData (`plugin_data` is its number in the registry) is one block: a record of BLOCK_HEAD, one of
 MEMBER for each body, each body's last wrench (WRENCH numbers), what was left in MuJoCo's cfrc_ext for each (as many), a
@@ -14,6 +15,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from rftsim.errors import SceneError
 from rftsim.law.layout import WRENCH
 from rftsim.machine import registry
 from rftsim.machine.kernel import exact_kernel
@@ -21,11 +23,25 @@ from rftsim.machine.kernel import exact_kernel
 CHUNK: Final = 500
 """Numbers of one numeric: MuJoCo's XML reader takes no more. A surface goes on in the numerics behind its first."""
 BODY_MARKER: Final = "rftsim-body:"
+MORE_MARKER: Final = "rftsim-body-"
+"""Instead of BODY_MARKER, with the numeric's number and a colon behind it, where a surface goes on."""
 SAND_MARKER: Final = "rftsim-sand:"
-BLOCK_HEAD: Final = np.dtype([("nbody", "i8"), ("bed", "i8")])
-"""Number of bodies, and the numeric of the bed."""
-MEMBER: Final = np.dtype([("body", "i8"), ("numeric", "i8")])
-"""A body's id, and the numeric of its surface."""
+BLOCK_HEAD: Final = np.dtype(
+    [
+        *((name, "i8") for name in ("nbody", "bed", "state", "state_size", "has_complained")),
+        ("bed_weight", "f8"),
+    ]
+)
+"""Number of bodies; the bed's place in numeric_data; address and size of the state that lasts; whether it was said that
+the numbers were changed; the weight of the bed's sealed numbers, see `checks`."""
+MEMBER: Final = np.dtype(
+    [
+        *((name, "i8") for name in ("body", "start", "size", "looked_at")),
+        *((name, "f8") for name in ("weight", "header_weight", "weight_so_far", "ntri", "wheel_radius")),
+    ]
+)
+"""A body's id; its surface's place in numeric_data, and how many numbers it has; how many were looked at since their
+weight was last compared; their weight and that of the header; that of those looked at; what the size follows from."""
 COUNTERS: Final = np.dtype(
     [
         *((name, "f8") for name in ("evaluations", "derivatives", "unsolved")),
@@ -74,9 +90,15 @@ class Block(NamedTuple):
     """Record of COUNTERS."""
 
 
-def read_block(number: int, owner: int, instance: int) -> Block:
-    """The block of an instance in the mjData at `owner` whose plugin data is `number`."""
-    address = registry.read_address(number, owner, instance)
+def read_block(numbers: Any, owner: int, instance: int) -> Block:
+    """The block of an instance in the mjData at `owner` whose plugin data is `numbers`.
+
+    Raises:
+        SceneError: The data has none: it was made of another model.
+    """
+    address = registry.read_address(int(numbers[instance]), owner, instance) if instance < len(numbers) else 0
+    if address == 0:
+        raise SceneError("the data holds nothing of the model's sand: make it with mujoco.MjData(model), and step it")
     n = int(_view(address, BLOCK_HEAD, 1)[0]["nbody"])
     members = _view(address + _HEAD, MEMBER, n)
     wrenches = _view(address + wrenches_start(n), np.dtype("f8"), WRENCH * n).reshape(n, WRENCH)

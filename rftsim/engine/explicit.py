@@ -1,22 +1,26 @@
 """The sand's force at the velocity of the moment."""
 
 from rftsim.engine import bodies, instance
+from rftsim.engine.refusals import WHY
 from rftsim.law import exports
 from rftsim.machine.compiling import inline
 from rftsim.machine.memory import doubles, pointer, stack_doubles
 
 
 @inline
-def press(model, data, m, d, number):
-    """Evaluate the sand on every body of the instance and add it to qfrc_passive."""
+def press(model, data, m, d, number, is_for_implicit):
+    """Evaluate the sand on every body of an instance of one of the two forces, and add it to qfrc_passive."""
     address = instance.block_of(model, data, m, d, number)
-    sand = instance.numeric(model, m, instance.head(address).bed).ctypes.data
+    size = instance.needed_state(model, m, address) if address != 0 and is_for_implicit else 0
+    if address == 0 or instance.is_sound(m, address, size) == 0:
+        instance.spoil(model, data, m, d, number, address, WHY.changed)
+        return
+    sand = instance.bed(model, m, address)
     t = bodies.tree(model, data, m, d)
     force = doubles(pointer(d + data.qfrc_passive), pointer(m + model.nv))
     v, w = doubles(stack_doubles(3), 3), doubles(stack_doubles(3), 3)
     for k in range(instance.head(address).nbody):
-        body = instance.body(address, k)
-        surface = instance.numeric(model, m, instance.numeric_of(address, k)).ctypes.data
+        body, surface = instance.body(address, k), instance.surface(model, m, address, k)
         bodies.twist(t, body, v, w)
         x = t.xpos[3 * body : 3 * body + 3]
         r = t.xmat[9 * body : 9 * body + 9].ctypes.data

@@ -9,6 +9,7 @@ from typing import Final
 
 from rftsim.engine import bodies, constraints, external, instance, islands
 from rftsim.engine.layout import CONSTANTS
+from rftsim.engine.refusals import WHY
 from rftsim.law import exports
 from rftsim.law.body import bed_at, header_at
 from rftsim.machine.compiling import inline
@@ -26,19 +27,13 @@ _WORK: Final = len(WORK.names or ())
 
 
 @inline
-def _numeric(model, m, number):
-    """Address of a numeric of the model."""
-    return pointer(m + model.numeric_data) + 8 * int32s(pointer(m + model.numeric_adr), number + 1)[number]
-
-
-@inline
 def _find_near(model, m, t, address, old, out):
     """Fill out with the places of the bodies that can be in the sand within the step, or last had their step split."""
-    sand, found = _numeric(model, m, instance.head(address).bed), 0
+    sand, found = instance.bed(model, m, address), 0
     nv, h = pointer(m + model.nv), doubles(m + model.opt_timestep, 1)[0]
     twist = doubles(stack_doubles(6), 6)
     for k in range(instance.head(address).nbody):
-        body, surface = instance.body(address, k), _numeric(model, m, instance.numeric_of(address, k))
+        body, surface = instance.body(address, k), instance.surface(model, m, address, k)
         bodies.twist(t, body, twist[:3], twist[3:])
         speed = size_of(twist, 2.0 * header_at(surface).gyration)
         xpos, xmat = t.xpos[3 * body : 3 * body + 3], t.xmat[9 * body : 9 * body + 9]
@@ -102,7 +97,7 @@ def _fill_bodies(model, m, t, address, old, i, island, p):
     sand, v, w = equation.head(p).sand, doubles(stack_doubles(3), 3), doubles(stack_doubles(3), 3)
     for b in range(equation.head(p).nbody):
         k = islands.near(i)[islands.members(i)[first + b]]
-        body, surface = instance.body(address, k), _numeric(model, m, instance.numeric_of(address, k))
+        body, surface = instance.body(address, k), instance.surface(model, m, address, k)
         equation.surface(p)[b], equation.length(p)[b] = surface, header_at(surface).gyration
         r, f, path, n = equation.rotation(p, b), equation.frame(p, b), equation.path(p, b), 0
         dof = bodies.last_dof(t, body)
@@ -229,14 +224,16 @@ def _hand_over(model, data, m, d, address, new, i, island, p):
 
 @inline
 def _solve(model, data, contact, m, d, t, address, old, new, i, island):
-    """Solve for the sand's force on one island."""
+    """Solve for the sand's force on one island; whether there was memory to do so."""
     p, work = stack_doubles(TABLE), doubles(stack_doubles(_WORK), _WORK)
     linear_algebra.clear(work)
     counts = islands.body_count(i)[island], islands.dof_count(i)[island], islands.row_count(i)[island]
     memory = take(equation.lay_out(p, counts[0], counts[1], counts[2]))
+    if memory == 0:
+        return False
     equation.place(p, memory)
     head, numbers = equation.head(p), equation.numbers(p)
-    head.sand, head.work = _numeric(model, m, instance.head(address).bed), work.ctypes.data
+    head.sand, head.work = instance.bed(model, m, address), work.ctypes.data
     bed = bed_at(head.sand)
     numbers.tolerance, numbers.iterations = bed.tolerance, bed.iterations
     numbers.drift = numbers.parts = 0.0
@@ -250,14 +247,18 @@ def _solve(model, data, contact, m, d, t, address, old, new, i, island):
     _hand_over(model, data, m, d, address, new, i, island, p)
     instance.add_work(address, work, counts[0] / islands.head(i).nbody)
     release(memory)
+    return True
 
 
 @inline
 def press(model, data, contact, m, d, number):
     """Solve for the sand's force at the end of the step and add it to qfrc_passive."""
     address = instance.block_of(model, data, m, d, number)
+    if address == 0 or instance.is_sound(m, address, instance.needed_state(model, m, address)) == 0:
+        instance.spoil(model, data, m, d, number, address, WHY.changed)
+        return
     nv, nbody, nrow = pointer(m + model.nv), instance.head(address).nbody, int32s(d + data.nefc, 1)[0]
-    lasting, wrenches = instance.lasting(model, data, m, d, number), instance.all_wrenches(address)
+    lasting, wrenches = instance.lasting(address), instance.all_wrenches(address)
     old, new = lasting.ctypes.data, instance.pending(address, lasting.size)
     linear_algebra.clear(wrenches)
     linear_algebra.clear(new)
@@ -265,6 +266,9 @@ def press(model, data, contact, m, d, number):
     instance.count(address, 0.0)
     t, i = bodies.tree(model, data, m, d), stack_doubles(_ISLANDS)
     memory = take(islands.lay_out(i, pointer(m + model.ntree), nv, nbody, nrow))
+    if memory == 0:
+        instance.spoil(model, data, m, d, number, address, WHY.exhausted)
+        return
     islands.begin(i, memory)
     found = _find_near(model, m, t, address, old, islands.near(i))
     islands.head(i).nbody = found
@@ -272,6 +276,8 @@ def press(model, data, contact, m, d, number):
         _sort(model, data, m, d, t, address, i)
         _compute_drives(model, data, m, d, t, i)
         for island in range(islands.head(i).ntree):
-            if islands.body_count(i)[island] > 0:
-                _solve(model, data, contact, m, d, t, address, old, new.ctypes.data, i, island)
+            if islands.body_count(i)[island] > 0 and not _solve(
+                model, data, contact, m, d, t, address, old, new.ctypes.data, i, island
+            ):
+                instance.spoil(model, data, m, d, number, address, WHY.exhausted)
     release(memory)

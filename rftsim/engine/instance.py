@@ -1,63 +1,31 @@
 """A plugin instance for compiled code: its bodies and its block of memory, see `block`."""
 
-from rftsim.engine import block
-from rftsim.engine.block import BODY_MARKER, SAND_MARKER
-from rftsim.law.layout import BED, WRENCH, numbers_in
+import numpy as np
+from numba import types
+
+from rftsim.engine import block, external, names
+from rftsim.engine.refusals import WHY
+from rftsim.law.layout import WRENCH, numbers_in
 from rftsim.machine import claims
 from rftsim.machine.compiling import exact, inline
-from rftsim.machine.memory import characters, doubles, int32s, int64s, pointer
+from rftsim.machine.memory import doubles, int32s, int64s, pointer
 from rftsim.machine.records import record_at
 from rftsim.solver import state
 
-_BODY_MARKER, _SAND_MARKER = BODY_MARKER.encode(), SAND_MARKER.encode()
-_BED = numbers_in(BED)
 _MEMBER = block.MEMBER.itemsize
 _HEAD = block.BLOCK_HEAD.itemsize
 _COUNTERS = numbers_in(block.COUNTERS)
 
+REASONS = 16
+"""What is wrong, of fewer reasons than these, and where the name of that stands, are handed over as one number."""
+
+_make_block = types.ExternalFunction("rftsim_make_block", types.intp(types.intp, types.intp, types.intc))
+is_sound = types.ExternalFunction("rftsim_is_sound", types.intc(types.intp, types.intp, types.intp))
+"""Those of `callbacks`, compiled once."""
+
 head = record_at(block.BLOCK_HEAD)
 """The record BLOCK_HEAD of the block at an address."""
 _member_at, _counters_at = record_at(block.MEMBER), record_at(block.COUNTERS)
-
-
-@exact
-def _is_marked(names, numeric, marker, owner):
-    """Whether the name at `numeric` is the name at `owner` with the marker inserted somewhere."""
-    same = 0
-    while names[numeric + same] != 0 and names[numeric + same] == names[owner + same]:
-        same += 1
-    for start in range(same + 1):
-        k = 0
-        while k < len(marker) and names[numeric + start + k] == marker[k]:
-            k += 1
-        if k < len(marker):
-            continue
-        i = start
-        while names[owner + i] != 0 and names[numeric + i + k] == names[owner + i]:
-            i += 1
-        if names[owner + i] == 0 and names[numeric + i + k] == 0:
-            return True
-    return False
-
-
-@exact
-def _find_numeric(model, m, marker, owner):
-    names = characters(pointer(m + model.names))
-    count = pointer(m + model.nnumeric)
-    address = int32s(pointer(m + model.name_numericadr), count)
-    for i in range(count):
-        if _is_marked(names, address[i], marker, owner):
-            return i
-    return -1
-
-
-@exact
-def numeric(model, m, i):
-    """A numeric field of the model, as a view."""
-    count = pointer(m + model.nnumeric)
-    start = int32s(pointer(m + model.numeric_adr), count)[i]
-    size = int32s(pointer(m + model.numeric_size), count)[i]
-    return doubles(pointer(m + model.numeric_data) + 8 * start, size)
 
 
 @exact
@@ -78,39 +46,84 @@ def wanted_state(model, m, instance):
 
 
 @exact
-def granted_state(model, m, instance):
-    """Numbers of plugin_state that the instance has."""
-    return int32s(pointer(m + model.plugin_statenum), pointer(m + model.nplugin))[instance]
+def needed_state(model, m, address):
+    """The same of a block, whatever the model says by now of its bodies."""
+    return state.state_size(head(address).nbody, pointer(m + model.nv))
 
 
 @exact
-def _slot(data, d, instance):
+def granted_state(model, m, instance):
+    """Numbers of plugin_state that the instance has; none where what the model says of them cannot be."""
+    n, end = pointer(m + model.nplugin), pointer(m + model.npluginstate)
+    start = int32s(pointer(m + model.plugin_stateadr), n)[instance]
+    size = int32s(pointer(m + model.plugin_statenum), n)[instance]
+    return int(size) if start >= 0 and 0 <= size <= end - start else 0
+
+
+@exact
+def slot(data, d, instance):
     """Where mjData keeps the number of an instance's block, (1,)."""
     return int64s(pointer(d + data.plugin_data) + 8 * instance, 1)
 
 
+@exact
+def name(model, m, instance):
+    """The address of an instance's name."""
+    place = names.start_of(model, m, model.name_pluginadr, pointer(m + model.nplugin), instance)
+    return pointer(m + model.names) + place
+
+
 @inline
 def block_of(model, data, m, d, instance):
-    """The address of an instance's block; made anew where mjData lost it, as it does when it is pickled."""
-    slot = _slot(data, d, instance)
-    number = claims.find(slot[0], d, instance)
+    """The address of an instance's block; made anew where mjData lost it, as it does when it is pickled, or zero."""
+    place = slot(data, d, instance)
+    number = claims.find(place[0], d, instance)
     if number < 0:
-        initialise(model, data, m, d, instance)
-    elif number != slot[0]:
-        slot[0] = number
-    return claims.address(slot[0])
+        if _make_block(m, d, instance) % REASONS != WHY.none:
+            return 0
+    elif number != place[0]:
+        place[0] = number
+    return claims.address(place[0])
+
+
+@inline
+def member(address, k):
+    """The record MEMBER of the k-th body of a block."""
+    return _member_at(address + _HEAD + _MEMBER * k)
 
 
 @exact
 def body(address, k):
     """The id of the k-th body of a block."""
-    return _member_at(address + _HEAD + _MEMBER * k).body
+    return member(address, k).body
 
 
 @exact
-def numeric_of(address, k):
-    """The numeric of the surface of the k-th body of a block."""
-    return _member_at(address + _HEAD + _MEMBER * k).numeric
+def surface(model, m, address, k):
+    """The address of the surface of the k-th body of a block."""
+    return pointer(m + model.numeric_data) + 8 * member(address, k).start
+
+
+@exact
+def bed(model, m, address):
+    """The address of the bed of a block."""
+    return pointer(m + model.numeric_data) + 8 * head(address).bed
+
+
+@exact
+def spoil(model, data, m, d, instance, address, why):
+    """Make the force of an instance NaN, which MuJoCo warns about, and say once why; see WHY."""
+    force = doubles(pointer(d + data.qfrc_passive), pointer(m + model.nv))
+    for i in range(force.size):
+        force[i] = np.nan
+    if address == 0:
+        return
+    wrenches = all_wrenches(address)
+    for i in range(wrenches.size):
+        wrenches[i] = np.nan
+    if head(address).has_complained == 0:
+        head(address).has_complained = 1
+        external.warn(why, name(model, m, instance))
 
 
 @exact
@@ -161,75 +174,35 @@ def pending(address, size):
 
 
 @exact
-def _words(model, m, instance):
-    """Words of an instance's block."""
-    start = block.state_start(count_bodies(model, m, instance))
-    return start // 8 + granted_state(model, m, instance)
-
-
-@exact
-def lasting(model, data, m, d, instance):
+def lasting(address):
     """The state after the last step, a view of MuJoCo's plugin_state."""
-    start = int32s(pointer(m + model.plugin_stateadr), pointer(m + model.nplugin))[instance]
-    return doubles(pointer(d + data.plugin_state) + 8 * start, granted_state(model, m, instance))
-
-
-@exact
-def initialise(model, data, m, d, instance):
-    """Make the block of an instance; -1 where a body or the bed has no numbers."""
-    words = _words(model, m, instance)
-    number = claims.make(-1, d, instance, words)
-    if number < 0:
-        return -1
-    address = claims.address(number)
-    blank = int64s(address, words)
-    for i in range(words):
-        blank[i] = 0
-    if not _find_numerics(model, m, instance, address):
-        claims.drop(number)
-        return -1
-    _slot(data, d, instance)[0] = number
-    return 0
-
-
-@exact
-def _find_numerics(model, m, instance, address):
-    """Fill a block's head and members; whether the bed and each body have numbers."""
-    nbody = pointer(m + model.nbody)
-    plugins = int32s(pointer(m + model.body_plugin), nbody)
-    names = int32s(pointer(m + model.name_bodyadr), nbody)
-    instances = int32s(pointer(m + model.name_pluginadr), pointer(m + model.nplugin))
-    bed = _find_numeric(model, m, _SAND_MARKER, instances[instance])
-    head(address).bed, found = bed, 0
-    complete = bed >= 0 and numeric(model, m, bed).size == _BED
-    for body in range(nbody):
-        if plugins[body] == instance:
-            member = _member_at(address + _HEAD + _MEMBER * found)
-            member.body, member.numeric = body, _find_numeric(model, m, _BODY_MARKER, names[body])
-            complete = complete and member.numeric >= 0
-            found += 1
-    head(address).nbody = found
-    return complete
+    return doubles(head(address).state, head(address).state_size)
 
 
 @exact
 def destroy(data, d, instance):
     """Release the block of an instance."""
-    number = claims.find(_slot(data, d, instance)[0], d, instance)
+    number = claims.find(slot(data, d, instance)[0], d, instance)
     if number >= 0:
         claims.drop(number)
 
 
 @exact
 def copy(model, data, target, m, origin, instance):
-    """Give another mjData a copy of the block."""
-    size = _words(model, m, instance)
-    original = int64s(block_of(model, data, m, origin, instance), size)
-    number = claims.make(_slot(data, target, instance)[0], target, instance, size)
-    fresh = int64s(claims.address(number), size)
+    """Give another mjData a copy of the block; where there is none to copy, it makes its own when it needs one."""
+    address = block_of(model, data, m, origin, instance)
+    if address == 0:
+        return
+    size = claims.words(slot(data, origin, instance)[0])
+    number = claims.make(slot(data, target, instance)[0], target, instance, size)
+    if number < 0:
+        return
+    original, fresh = int64s(address, size), int64s(claims.address(number), size)
     for i in range(size):
         fresh[i] = original[i]
-    _slot(data, target, instance)[0] = number
+    start = head(address).state - pointer(origin + data.plugin_state)
+    head(claims.address(number)).state = pointer(target + data.plugin_state) + start
+    slot(data, target, instance)[0] = number
 
 
 @exact
@@ -245,7 +218,9 @@ def forget(address):
 def keep(model, data, m, d, instance):
     """End a step: what it left pending lasts, and its work is counted."""
     address = block_of(model, data, m, d, instance)
-    now = lasting(model, data, m, d, instance)
+    if address == 0:
+        return
+    now = lasting(address)
     waiting = pending(address, now.size)
     for i in range(now.size):
         now[i] = waiting[i]

@@ -14,6 +14,9 @@ import mujoco
 import numpy as np
 from mujoco.introspect import ast_nodes, structs
 
+from rftsim.engine import refusals
+from rftsim.law import layout as law
+
 _SCALARS: dict[str, type[Any]] = {
     "int": ctypes.c_int,
     "unsigned int": ctypes.c_uint,
@@ -55,10 +58,11 @@ CONSTANTS: Final = {
     "box": int(mujoco.mjtGeom.mjGEOM_BOX),
 }
 """Those that are compiled in."""
-GIVEN: Final = repr(CONSTANTS)
+GIVEN: Final = repr(CONSTANTS) + law.GIVEN
 """All that machine code of the engine is made from beside its sources."""
 FUNCTIONS: Final = (
     *("mj_fwdActuation", "mj_rne", "mj_referenceConstraint", "mj_isSparse", "mjd_smooth_vel", "mju_rayGeom"),
+    *("mju_error", "mju_warning", "mju_free"),
 )
 """Those that compiled code calls by name, see `external`."""
 SYMBOL: Final = "rftsim_layout"
@@ -77,9 +81,13 @@ class Model(NamedTuple):
     nu: int
     ntree: int
     nnumeric: int
+    nnumericdata: int
+    nnames: int
     nsite: int
     nsensor: int
+    nsensordata: int
     nplugin: int
+    npluginstate: int
     body_parentid: int
     body_rootid: int
     body_dofnum: int
@@ -97,6 +105,7 @@ class Model(NamedTuple):
     sensor_type: int
     sensor_objid: int
     sensor_adr: int
+    sensor_dim: int
     sensor_cutoff: int
     sensor_history: int
     sensor_historyadr: int
@@ -125,6 +134,9 @@ class Data(NamedTuple):
     """Byte offsets of fields in MuJoCo's struct mjData."""
 
     nefc: int
+    nplugin: int
+    buffer: int
+    arena: int
     time: int
     history: int
     contact: int
@@ -228,6 +240,7 @@ def publish() -> None:
     llvm.add_symbol(SYMBOL, ctypes.addressof(table))
     for name in FUNCTIONS:
         llvm.add_symbol(name, ctypes.cast(getattr(library(), name), ctypes.c_void_p).value)
+    refusals.publish()
 
 
 def layout() -> tuple[Model, Data, Contact]:

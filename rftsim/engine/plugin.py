@@ -20,8 +20,8 @@ IMPLICIT: Final = "rftsim.sand.implicit"
 """The two plugins: the force at the velocity of the moment, and the one at the end of the step."""
 
 
-class _Plugin(ctypes.Structure):
-    """mjpPlugin, as mjplugin.h declares it."""
+class Plugin(ctypes.Structure):
+    """The struct mjpPlugin, as mjplugin.h declares it."""
 
     _fields_ = [
         ("name", ctypes.c_char_p),
@@ -59,7 +59,7 @@ def register(name: str) -> int:
         LayoutError: This MuJoCo lays out its structs otherwise than it describes them.
     """
     library = layout.library()
-    size = ctypes.sizeof(_Plugin)
+    size = ctypes.sizeof(Plugin)
     memory = ctypes.create_string_buffer(b"\xff" * (size + 64), size + 64)
     library.mjp_defaultPlugin(memory)
     if memory.raw[:size].strip(b"\0") or memory.raw[size : size + 8] != b"\xff" * 8:
@@ -68,15 +68,15 @@ def register(name: str) -> int:
     evaluate.linked()  # which the solver calls by name, and the engine both
     link.load("solver", GIVEN)("rftsim_step")
     address = link.load("engine", layout.GIVEN)
-    plugin = _Plugin.from_buffer(memory)
+    plugin = Plugin.from_buffer(memory)
     plugin.name = name.encode()
     bits = mujoco.mjtPluginCapabilityBit
     plugin.capabilityflags = bits.mjPLUGIN_PASSIVE | bits.mjPLUGIN_SENSOR
     plugin.needstage = mujoco.mjtStage.mjSTAGE_ACC  # when MuJoCo has read the sensors of forces that are mended
     kind = "explicit" if name == EXPLICIT else "implicit"
-    for field in ("nsensordata", "init", "destroy", "copy", "reset", "advance"):
+    for field in ("nsensordata", "destroy", "copy", "reset", "advance"):
         setattr(plugin, field, address(f"rftsim_{field}"))
-    for field in ("nstate", "compute"):
+    for field in ("nstate", "init", "compute"):
         setattr(plugin, field, address(f"rftsim_{kind}_{field}"))
     _keep.append(plugin)
     ctypes.pythonapi.Py_IncRef(ctypes.py_object(_keep))  # mjData may be freed after this module at exit

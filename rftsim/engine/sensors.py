@@ -72,10 +72,13 @@ def _carries(t, address, body):
 
 
 @exact
-def _read_wrench(address, body, out):
-    """Copy a body's wrench to a sensor that names it."""
+def _read_wrench(model, data, m, d, address, body, start):
+    """Copy a body's wrench to a sensor that names it and starts at a place of sensordata."""
+    if not 0 <= start <= pointer(m + model.nsensordata) - WRENCH:
+        return
     for k in range(instance.head(address).nbody):
         if instance.body(address, k) == body:
+            out = doubles(pointer(d + data.sensordata) + 8 * start, WRENCH)
             linear_algebra.copy(instance.wrench(address, k), out)
 
 
@@ -104,23 +107,27 @@ def _cut(out, cutoff):
 def read_wrenches(model, data, m, d, number):
     """Read the wrench on each body that a sensor of an instance names."""
     address = instance.block_of(model, data, m, d, number)
-    all_sensors, readings = _sensors(model, m), pointer(d + data.sensordata)
+    if address == 0:
+        return
+    all_sensors = _sensors(model, m)
     for i in range(all_sensors.plugin.size):
         if all_sensors.plugin[i] == number:
-            _read_wrench(address, all_sensors.owner[i], doubles(readings + 8 * all_sensors.start[i], WRENCH))
+            _read_wrench(model, data, m, d, address, all_sensors.owner[i], all_sensors.start[i])
 
 
 @inline
 def read(model, data, m, d, number, is_implicit):
     """Read the wrenches on an instance's bodies, and mend every sensor of MuJoCo's that they concern."""
     address = instance.block_of(model, data, m, d, number)
+    if address == 0:
+        return
     all_sensors, readings = _sensors(model, m), pointer(d + data.sensordata)
     t = bodies.tree(model, data, m, d)
     reactions.add_sand(data, d, t, address)
     for i in range(all_sensors.kind.size):
         kind, owner, place = all_sensors.kind[i], all_sensors.owner[i], readings + 8 * all_sensors.start[i]
         if all_sensors.plugin[i] == number:
-            _read_wrench(address, owner, doubles(place, WRENCH))
+            _read_wrench(model, data, m, d, address, owner, all_sensors.start[i])
         if kind != _TOUCH and kind != _FORCE and kind != _TORQUE:
             continue
         body = all_sensors.site_body[owner]

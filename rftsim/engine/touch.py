@@ -42,7 +42,7 @@ def _creep(model, m, t, address, v, w):
     """The speed below which the implicit force falls to zero in this step [m/s]; v and w (3,) are overwritten."""
     found = V_C
     for k in range(instance.head(address).nbody):
-        length = header_at(instance.numeric(model, m, instance.numeric_of(address, k)).ctypes.data).gyration
+        length = header_at(instance.surface(model, m, address, k)).gyration
         bodies.twist(t, instance.body(address, k), v, w)
         found = max(found, CREEP * (np.sqrt(dot(v, v)) + length * np.sqrt(dot(w, w))))
     return found
@@ -99,12 +99,14 @@ def _pressed(model, data, m, d, t, address, k, site, is_implicit):
     body, wrench = instance.body(address, k), instance.wrench(address, k)
     if wrench[0] == 0.0 and wrench[1] == 0.0 and wrench[2] == 0.0:
         return 0.0
-    sand = instance.numeric(model, m, instance.head(address).bed).ctypes.data
-    surface = instance.numeric(model, m, instance.numeric_of(address, k)).ctypes.data
+    if instance.is_sound(m, address, instance.head(address).state_size) == 0:
+        return np.nan
+    sand = instance.bed(model, m, address)
+    surface = instance.surface(model, m, address, k)
     n = int(header_at(surface).ntri)
     memory = take(8 * _COLUMNS * n)
     if memory == 0:
-        return 0.0
+        return np.nan
     v, w = doubles(stack_doubles(3), 3), doubles(stack_doubles(3), 3)
     v_c = _creep(model, m, t, address, v, w) if is_implicit else 0.0
     bodies.twist(t, body, v, w)

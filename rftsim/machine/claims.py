@@ -88,6 +88,12 @@ def address(number):
 
 
 @exact
+def words(number):
+    """The size of the memory of a place, in words."""
+    return _place_at(_table_address() + _BYTES * number).words
+
+
+@exact
 def drop(number):
     """Release a place and its memory."""
     place = _place_at(_table_address() + _BYTES * number)

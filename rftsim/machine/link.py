@@ -10,6 +10,7 @@ import hashlib
 import logging
 import lzma
 import os
+import stat
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -26,6 +27,8 @@ SHIPPED: Final = Path(__file__).parent / "shipped"
 SUMS: Final = SHIPPED / "SHA256SUMS"
 """The SHA-256 of each object file that ships, as `sha256sum` writes them; one that is not as listed is not linked."""
 SHIPPED_FOR: Final = "x86-64-v3"
+KEPT: Final = "rftsim-machine"
+"""The folder for what was compiled here."""
 _LOG: Final = logging.getLogger(__name__)
 _FEATURES: Final = ("avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe")
 
@@ -79,16 +82,46 @@ def object_file(part: str, given: str) -> bytes:
     key = hashlib.sha256(key + machine.encode()).digest()
     name = f"rftsim-{part}-{key.hex()[:16]}.o.xz"
     for folder in folders():
-        if (code := _read(folder / name, key)) is not None:
+        path = folder / name
+        if path.exists() and is_only_ours(folder, path) and (code := _read(path, key)) is not None:
             return code
     _LOG.warning("rftsim compiles its %s for this machine, once; it takes a minute or two", part)
     from rftsim.machine.build import build  # which needs numba
 
     code = build(part)
     for folder in folders():
-        if write(folder / name, key, code):
+        if _is_made(folder) and write(folder / name, key, code):
             break
     return code
+
+
+def _is_made(folder: Path) -> bool:
+    """Make a folder that this user alone can write, if there is none; whether it is there and is one."""
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    except OSError:
+        return False
+    return is_only_ours(folder)
+
+
+def is_only_ours(*paths: Path) -> bool:
+    """Whether nobody but this user, and root, can write paths; where systems know no owners, whoever wrote is trusted.
+
+    Machine code that another could have put there is not to run.
+    """
+    if not hasattr(os, "getuid"):
+        return True
+    for path in paths:
+        try:
+            found = path.lstat()
+        except OSError:
+            return False
+        if found.st_uid not in (os.getuid(), 0) or stat.S_ISLNK(found.st_mode) or found.st_mode & 0o022:
+            _LOG.warning(
+                "rftsim takes no compiled code from %s, which others can write: chmod go-w, or delete it", path
+            )
+            return False
+    return True
 
 
 def key_of(part: str, given: str) -> bytes:
@@ -124,13 +157,13 @@ def takes_shipped() -> bool:
 
 
 def folders() -> list[Path]:
-    """Where compiled code may be kept, by numba's convention."""
+    """Where compiled code may be kept: in a folder of its own, which this user alone can write, in numba's places."""
     if chosen := os.environ.get("NUMBA_CACHE_DIR"):
-        return [Path(chosen)]
+        return [Path(chosen) / KEPT]
     users = {"darwin": "~/Library/Caches", "win32": "~/AppData/Local"}.get(sys.platform, "~/.cache")
     users = os.path.expanduser(os.environ.get("XDG_CACHE_HOME") or users)
-    own = PACKAGE / "__pycache__"
-    return [own, Path(users) / "numba"] if os.path.isabs(users) else [own]  # else it knows no home
+    own = PACKAGE / "__pycache__" / KEPT
+    return [own, Path(users) / "numba" / KEPT] if os.path.isabs(users) else [own]  # else it knows no home
 
 
 def is_made_from(path: Path, key: bytes) -> bool:

@@ -19,7 +19,9 @@ def _pointer(element: Any) -> Any:
     return cast
 
 
-_doubles, _int32s, _int64s, _bytes = (_pointer(t) for t in (types.float64, types.int32, types.int64, types.uint8))
+_doubles, _int32s, _int64s, _uint64s, _bytes = (
+    _pointer(t) for t in (types.float64, types.int32, types.int64, types.uint64, types.uint8)
+)
 
 
 @njit(forceinline=True)
@@ -47,9 +49,15 @@ def int64s(address, size):
 
 
 @njit(forceinline=True)
-def characters(address):
-    """Pointer to the bytes at an address."""
-    return _bytes(address)
+def uint64s(address, size):
+    """View of `size` uint64 at an address."""
+    return carray(_uint64s(address), (size,))
+
+
+@njit(forceinline=True)
+def bytes_at(address, size):
+    """View of `size` bytes at an address."""
+    return carray(_bytes(address), (size,))
 
 
 @njit(forceinline=True)

@@ -5,7 +5,8 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 
-from rftsim.engine.block import BODY_MARKER, SAND_MARKER, read_block
+from rftsim.engine import seal
+from rftsim.engine.block import BODY_MARKER, MORE_MARKER, SAND_MARKER, read_block
 from rftsim.errors import SceneError
 from rftsim.law import evaluate, layout
 from rftsim.model.stale import tell_stale
@@ -66,21 +67,32 @@ class Instance(NamedTuple):
 
 
 def instances(model: mujoco.MjModel) -> list[Instance]:
-    """The beds of sand in a model."""
+    """The beds of sand in a model.
+
+    Raises:
+        SceneError: Numbers of a bed or a surface are missing, or were changed to what none can be.
+    """
     by_name = {model.numeric(i).name: i for i in range(model.nnumeric)}
     found: dict[int, dict[int, Array]] = {}
     for body in np.flatnonzero(model.body_plugin >= 0):
-        numeric = _marked(by_name, BODY_MARKER, model.body(int(body)).name)
-        if numeric is not None:
-            found.setdefault(int(model.body_plugin[body]), {})[int(body)] = _surface(model, numeric)
-    beds = []
-    for instance, bodies in found.items():
-        name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_PLUGIN, instance)
-        numeric = _marked(by_name, SAND_MARKER, name)
-        assert numeric is not None, "MuJoCo would not have made data for a bed without its sand"
-        start = int(model.numeric_adr[numeric])
-        beds.append(Instance(instance, name, start, _numeric(model, numeric), bodies))
-    return beds
+        surface = _surface(model, by_name, model.body(int(body)).name)
+        if surface is not None:
+            found.setdefault(int(model.body_plugin[body]), {})[int(body)] = surface
+    return [_instance(model, by_name, instance, bodies) for instance, bodies in found.items()]
+
+
+def _instance(model: mujoco.MjModel, by_name: dict[str, int], instance: int, bodies: dict[int, Array]) -> Instance:
+    """The bed of a plugin instance that bodies name."""
+    name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_PLUGIN, instance) or ""
+    marked = _marked(by_name, SAND_MARKER, name)
+    numbers = None if marked is None else _numeric(model, by_name[marked])
+    if marked is None or numbers is None or numbers.size != seal.BED_NUMBERS + seal.SEAL_NUMBERS:
+        raise SceneError(f"the model lacks the numbers of its bed {name!r}: make it anew with rftsim.add_sand")
+    packed, behind = numbers[: seal.BED_NUMBERS], numbers[seal.BED_NUMBERS :]
+    owns = (seal.own_name(name, start, behind) for start in range(len(name) + 1))
+    if not any(seal.is_sealed(packed[seal.SEALED], behind, own) for own in dict.fromkeys(owns)):
+        raise SceneError(f"the law of bed {name!r}, or its numbers' place, was changed: make the model anew")
+    return Instance(instance, name, int(model.numeric_adr[by_name[marked]]), packed, bodies)
 
 
 def sand_planes(model: mujoco.MjModel) -> list[int]:
@@ -95,26 +107,41 @@ def _drawn_bed(geom: str) -> str | None:
     return before + after if marker else None
 
 
-def _marked(by_name: dict[str, int], marker: str, owner: str) -> int | None:
-    for start in range(len(owner) + 1):
-        numeric = by_name.get(owner[:start] + marker + owner[start:])
-        if numeric is not None:
-            return numeric
-    return None
+def _marked(by_name: dict[str, int], marker: str, owner: str) -> str | None:
+    """The name of the numeric that is an owner's with a marker in it."""
+    names = (owner[:start] + marker + owner[start:] for start in range(len(owner) + 1))
+    return next((name for name in names if name in by_name), None)
 
 
 def _numeric(model: mujoco.MjModel, i: int) -> Array:
-    start = int(model.numeric_adr[i])
-    view: Array = model.numeric_data[start : start + int(model.numeric_size[i])]
+    start = max(int(model.numeric_adr[i]), 0)
+    view: Array = model.numeric_data[start : start + max(int(model.numeric_size[i]), 0)]
     return view
 
 
-def _surface(model: mujoco.MjModel, i: int) -> Array:
-    """A packed surface, which goes on behind its first numeric."""
-    start = int(model.numeric_adr[i])
-    header = layout.record(model.numeric_data[start:], layout.HEADER)
-    view: Array = model.numeric_data[start : start + layout.packed_size(header)]
-    return view
+def _surface(model: mujoco.MjModel, by_name: dict[str, int], owner: str) -> Array | None:
+    """The packed surface of a body, which goes on behind its first numeric; None where it has none."""
+    first = _marked(by_name, BODY_MARKER, owner)
+    if first is None:
+        return None
+    i = by_name[first]
+    places = [k for k in range(len(owner) + 1) if owner[:k] + BODY_MARKER + owner[k:] == first]
+    end = max(_end(by_name, i, owner[:k], owner[k:]) for k in places)
+    start, size = max(int(model.numeric_adr[i]), 0), int(model.numeric_size[i:end].sum())
+    numbers: Array = model.numeric_data[start : start + max(size, 0)]
+    size = numbers.size - seal.SEAL_NUMBERS
+    header = layout.record(numbers, layout.HEADER) if size > layout.HEADER_NUMBERS else None
+    if header is None or not 1.0 <= header.ntri <= size or layout.packed_size(header) != size:
+        raise SceneError(f"the surface of body {owner!r} was changed in the model: make it anew with rftsim.add_sand")
+    return numbers[:size]
+
+
+def _end(by_name: dict[str, int], i: int, before: str, after: str) -> int:
+    """The numeric behind those of a surface that starts at i, with so much of its owner's name on both sides."""
+    end = i + 1
+    while by_name.get(f"{before}{MORE_MARKER}{end - i}:{after}") == end:
+        end += 1
+    return end
 
 
 def wrenches(model: mujoco.MjModel, data: mujoco.MjData) -> Wrenches:
@@ -127,7 +154,7 @@ def wrenches(model: mujoco.MjModel, data: mujoco.MjData) -> Wrenches:
     beds = instances(model)
     tell_stale(model, [item for bed in beds for item in bed.bodies.items()])
     for bed in beds:
-        block = read_block(int(data.plugin_data[bed.id]), data._address, bed.id)
+        block = read_block(data.plugin_data, data._address, bed.id)
         force[block.bodies], moment[block.bodies] = block.wrenches[:, :3], block.wrenches[:, 3:]
     velocity, omega = body_velocities(model, data)
     return Wrenches(force, moment, np.einsum("ij,ij->i", force, velocity) + np.einsum("ij,ij->i", moment, omega))
@@ -190,7 +217,7 @@ def work(model: mujoco.MjModel, data: mujoco.MjData) -> Work:
     """The cost of the sand so far, summed over the beds."""
     totals = np.zeros(4, dtype=int)
     for bed in instances(model):
-        counters = read_block(int(data.plugin_data[bed.id]), data._address, bed.id).counters
+        counters = read_block(data.plugin_data, data._address, bed.id).counters
         totals += np.array([counters[name] for name in _TOTALS], dtype=int)
     steps, *costs = totals.tolist()
     return Work(steps, *costs)

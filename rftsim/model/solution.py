@@ -1,14 +1,10 @@
 """How exactly the implicit force is solved for: bounds of what the user may ask for."""
 
 import numbers
-from typing import Any, Final
+from typing import Any
 
+from rftsim.engine.seal import COUNTS, TOLERANCES
 from rftsim.errors import SceneError
-
-TOLERANCES: Final = (1e-6, 0.1)
-"""Least and largest tolerance of the implicit force, relative to a body's velocity [-]."""
-COUNTS: Final = (1, 60)
-"""Least and largest cap on the iterations of one solution."""
 
 
 def check_solution(tolerance: Any, iterations: Any, error: type[Exception] = SceneError) -> None:

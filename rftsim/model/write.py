@@ -7,6 +7,7 @@ from typing import Any, Final, NamedTuple
 import mujoco
 
 from rftsim.engine import block as engine
+from rftsim.engine import seal
 from rftsim.errors import SceneError
 from rftsim.sand.free_surface import FreeSurface
 from rftsim.surface.triangles import Array
@@ -75,13 +76,15 @@ def write_bed(spec: mujoco.MjSpec, carrier: Carrier, bed: Array, surfaces: Mappi
     """
     spec.activate_plugin(carrier.plugin)
     spec.add_plugin(name=carrier.name, plugin_name=carrier.plugin, active=True)
-    spec.add_numeric(name=engine.SAND_MARKER + carrier.name, data=bed, size=bed.size)
+    numbers = seal.sealed_bed(bed, carrier.name)
+    spec.add_numeric(name=engine.SAND_MARKER + carrier.name, data=numbers, size=numbers.size)
     for body, data in surfaces.items():
         _attach(spec.body(body).plugin, carrier)
-        for first in range(0, data.size, engine.CHUNK):
-            chunk = data[first : first + engine.CHUNK]
-            more = f"{first // engine.CHUNK}-" if first else ""
-            spec.add_numeric(name=more + engine.BODY_MARKER + body, data=chunk, size=chunk.size)
+        numbers = seal.sealed_surface(data, body, carrier.name)
+        for first in range(0, numbers.size, engine.CHUNK):
+            chunk = numbers[first : first + engine.CHUNK]
+            marker = f"{engine.MORE_MARKER}{first // engine.CHUNK}:" if first else engine.BODY_MARKER
+            spec.add_numeric(name=marker + body, data=chunk, size=chunk.size)
 
 
 def write_sensors(spec: mujoco.MjSpec, carrier: Carrier, bodies: Iterable[str]) -> None:

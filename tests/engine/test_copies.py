@@ -12,6 +12,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+from checked import CHECKED
 from mujoco import rollout
 from trees import BALL, SAND, sandy, spec_of, trajectory, tree
 
@@ -193,12 +194,12 @@ def in_a_process(code):
         data = mujoco.MjData(model); data.qvel[2] = -1.0; mujoco.mj_step(model, data); assert data.sensordata[2] > 1.0
     """
     command = [sys.executable, "-X", "faulthandler", "-c", textwrap.dedent(start) + textwrap.dedent(code)]
-    done = subprocess.run(command, env=os.environ | {"MALLOC_CHECK_": "3"}, capture_output=True, text=True, timeout=120)
+    done = subprocess.run(command, env=CHECKED, capture_output=True, text=True, timeout=120)
     return done.returncode, done.stderr[-2000:]
 
 
 def test_data_and_models_go_in_any_order():
-    """Nothing is freed twice or used after it: the heap is checked at each release (MALLOC_CHECK_)."""
+    """Nothing is freed twice or used after it: the heap is checked at each release, see `test_memory`."""
     code = """
         def make():
             data = mujoco.MjData(model)

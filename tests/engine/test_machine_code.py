@@ -136,12 +136,53 @@ def test_what_was_compiled_is_kept_where_numba_keeps_its_cache(compiler, tmp_pat
         assert link.object_file("law", "") == b"machine code of law"
     assert compiler == ["law"]
     assert len(caplog.records) == 1
-    (kept,) = tmp_path.iterdir()
+    (kept,) = (tmp_path / link.KEPT).iterdir()
     kept.write_bytes(kept.read_bytes()[:-5])
     link.object_file("law", "")
     link.object_file("law", "other constants")
     link.object_file("law", "")
     assert compiler == ["law"] * 3
+
+
+@pytest.mark.skipif(not hasattr(os, "getuid"), reason="this system knows no owners")
+@pytest.mark.parametrize("what", ["folder", "file", "link", "owner"])
+def test_code_that_others_can_write_is_not_run(compiler, tmp_path, monkeypatch, caplog, what):
+    """A folder or file that a group or others can write, a link, or another's is passed over in one line."""
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    link.object_file("law", "")
+    folder = tmp_path / link.KEPT
+    (kept,) = folder.iterdir()
+    assert folder.stat().st_mode & 0o777 == 0o700
+    if what == "link":
+        folder.rename(tmp_path / "elsewhere")
+        folder.symlink_to(tmp_path / "elsewhere")
+    elif what == "owner":
+        own = os.getuid()
+        monkeypatch.setattr(os, "getuid", lambda: own + 1 if own else 1)
+        if not own:
+            os.chown(kept, 2, -1)
+    else:
+        (folder if what == "folder" else kept).chmod(0o775)
+    caplog.clear()
+    assert link.object_file("law", "") == b"machine code of law"
+    assert compiler == ["law", "law"]
+    assert "takes no compiled code from" in caplog.text
+    if what == "file":  # written anew, it is our own again
+        link.object_file("law", "")
+        assert compiler == ["law", "law"]
+
+
+@pytest.mark.skipif(not hasattr(os, "getuid"), reason="this system knows no owners")
+def test_code_is_kept_whatever_the_umask(compiler, tmp_path, monkeypatch):
+    """Where a user's files are writable to the group, the folder for compiled code is not."""
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
+    before = os.umask(0o002)
+    try:
+        for _ in range(2):
+            link.object_file("law", "")
+    finally:
+        os.umask(before)
+    assert compiler == ["law"]
 
 
 def test_no_folder_to_write_to_is_no_error(compiler, tmp_path, monkeypatch):
@@ -157,10 +198,10 @@ def test_users_cache_follows_the_package(compiler, tmp_path, monkeypatch):
     """Without NUMBA_CACHE_DIR: the package's __pycache__, then the user's folder, whose name may be missing."""
     monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    assert link.folders() == [PACKAGE / "__pycache__", tmp_path / "numba"]
+    assert link.folders() == [PACKAGE / "__pycache__" / link.KEPT, tmp_path / "numba" / link.KEPT]
     monkeypatch.delenv("XDG_CACHE_HOME")
     monkeypatch.setattr(os.path, "expanduser", lambda path: path)
-    assert link.folders() == [PACKAGE / "__pycache__"]
+    assert link.folders() == [PACKAGE / "__pycache__" / link.KEPT]
 
 
 @pytest.mark.slow
@@ -168,7 +209,7 @@ def test_compiled_here_it_is_the_same(fresh):
     """What numba compiles for this processor moves the wheel as what ships does; again from the cache, at once."""
     shutil.rmtree(fresh / "rftsim" / link.SHIPPED.relative_to(PACKAGE))
     here = first_force(fresh)
-    kept = sorted(path.name for path in (fresh / "rftsim" / "__pycache__").glob("*.o.xz"))
+    kept = sorted(path.name for path in (fresh / "rftsim" / "__pycache__" / link.KEPT).glob("*.o.xz"))
     assert len(kept) == len(PARTS)
     again = first_force(fresh)
     assert "numba" not in again["heavy"]
