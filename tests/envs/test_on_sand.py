@@ -70,8 +70,7 @@ def test_the_contract_of_all_is_gymnasiums():
 
 
 def test_the_sand_carries_an_ant_that_stands():
-    """At a tolerance of 1e-3 it stays where it stands; at the default it settles a moment longer, 0.2 mm on its way."""
-    env = rftsim_envs.on_sand("Ant-v5", reset_noise_scale=0.0, tolerance=1e-3)
+    env = rftsim_envs.on_sand("Ant-v5", reset_noise_scale=0.0)
     env.reset(seed=0)
     model, data = env.unwrapped.model, env.unwrapped.data
     while data.time < 3.0:
