@@ -14,12 +14,14 @@ from rftsim.bench import buried_cases, free_cases, hard_cases, joined_cases, tri
 from rftsim.bench.hard_cases import CASES
 from rftsim.bench.memory import remember
 from rftsim.bench.trials import Force
-from rftsim.model.readout import work
+from rftsim.model.readout import instances, work
 
 STEPS: Final = (1e-4, 1e-3, 2e-3, 5e-3, 1e-2)
 """Time steps that every case is played at [s]."""
 CONVERGED: Final = 2e-5
 """Time step of the converged answers, with the implicit force [s]."""
+EXACT: Final = 1e-4
+"""Tolerance of the implicit force in those."""
 FORCES: Final[tuple[Force, ...]] = ("implicit", "explicit")
 STARTS_STEP: Final = 5e-3
 """Time step of the random starts [s]."""
@@ -78,11 +80,24 @@ class Starts(NamedTuple):
     """Equations of the implicit force that were not solved to their tolerance."""
 
 
-def play(case: str, h: float, force: Force, *, resting: float | None = None) -> Played:
-    """Play a hard case by its name at a time step [s]; `resting` shortens the time that bodies are left alone [s]."""
+def play(
+    case: str, h: float, force: Force, *, resting: float | None = None, tolerance: float | None = None
+) -> Played:
+    """Play a hard case by its name.
+
+    Args:
+        case: The name.
+        h: Time step [s].
+        force: Which force the sand has.
+        resting: Time that bodies are left alone [s], where it is not the case's own.
+        tolerance: Tolerance of the implicit force, where it is not the default.
+    """
     trial = CASES[case].build(h, force)
     if resting is not None:
         trial.resting = resting
+    if tolerance is not None:
+        for bed in instances(trial.model):
+            bed.bed.tolerance = tolerance
     measured = dict(CASES[case].play(trial))
     spent = work(trial.model, trial.data)
     steps = max(spent.steps, 1)
@@ -99,7 +114,7 @@ def references(case: str) -> dict[str, float]:
     wanted = [name for name, how in judged.items() if how.limit is None]
     found = {name: how.exact for name, how in judged.items() if how.exact is not None}
     if set(wanted) - set(found):
-        converged = play(case, CONVERGED, "implicit", resting=0.0).measured
+        converged = play(case, CONVERGED, "implicit", resting=0.0, tolerance=EXACT).measured
         found = {name: converged[name] for name in wanted} | found
     return found
 
