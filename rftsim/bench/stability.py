@@ -80,9 +80,7 @@ class Starts(NamedTuple):
     """Equations of the implicit force that were not solved to their tolerance."""
 
 
-def play(
-    case: str, h: float, force: Force, *, resting: float | None = None, tolerance: float | None = None
-) -> Played:
+def play(case: str, h: float, force: Force, *, resting: float | None = None, tolerance: float | None = None) -> Played:
     """Play a hard case by its name.
 
     Args:
