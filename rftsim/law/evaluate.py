@@ -2,7 +2,9 @@
 
 import ctypes
 import functools
+import os
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Final
 
 import numpy as np
@@ -13,6 +15,8 @@ from rftsim.machine import link
 from rftsim.surface.triangles import Array
 
 Flags = np.ndarray[tuple[int], np.dtype[np.bool_]]
+SHARE: Final = 1e7
+"""Poses times numbers of the surface that are worth a thread of their own: some ten milliseconds."""
 ALONG: Final = 1e-6
 """How far the cosine of a face's normal to the plane's is from 1 where it counts as along the plane."""
 
@@ -78,8 +82,37 @@ def body_wrenches(bed: Array, surface: Array, xpos: Array, xmat: Array, velocity
         velocity: Velocities of the body's origin [m/s], (n, 3).
         omega: Angular velocities, world frame [rad/s], (n, 3).
     """
-    out = np.empty((len(xpos), 6))
-    arrays = [*(np.ascontiguousarray(x, dtype=float) for x in (xpos, xmat, velocity, omega)), out]
-    fixed = bed.ctypes.data, surface.ctypes.data, len(out)
-    _function("rftsim_wrenches", 8)(*fixed, *(array.ctypes.data for array in arrays))
+    return wrenches_of(bed, surface, np.concatenate([np.ravel(x) for x in (xpos, xmat, velocity, omega)], dtype=float))
+
+
+def wrenches_of(bed: Array, surface: Array, numbers: Array) -> Array:
+    """Force [N] and moment about the body's origin [N m], world frame, (n, 6); many at once on several processors.
+
+    Args:
+        bed: Packed sand.
+        surface: Packed surface.
+        numbers: Of n poses all positions, then all rotations, velocities and angular velocities, shape (18 n,).
+    """
+    count = len(numbers) // 18
+    out = np.empty((count, 6))
+    function, start, end = _function("rftsim_wrenches", 8), numbers.ctypes.data, out.ctypes.data
+    packed = bed.ctypes.data, surface.ctypes.data
+
+    def work(first: int, last: int) -> None:
+        at = (start + 24 * first, start + 24 * count + 72 * first)
+        then = (start + 96 * count + 24 * first, start + 120 * count + 24 * first)
+        function(*packed, last - first, *at, *then, end + 48 * first)
+
+    several = min(count, int(count * surface.size / SHARE))
+    if several < 2:
+        work(0, count)
+        return out
+    with ThreadPoolExecutor(min(several, _processors())) as threads:
+        ends = np.linspace(0, count, several + 1).astype(int).tolist()
+        list(threads.map(work, ends[:-1], ends[1:]))
     return out
+
+
+def _processors() -> int:
+    """How many processors this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -1,7 +1,7 @@
 """The force of sand on one rigid surface, without MuJoCo: on each triangle at one pose, or as a whole at many."""
 
 import math
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,7 +14,7 @@ from rftsim.sand.medium import Sand
 from rftsim.surface.triangles import Array, Surface
 
 ROTATION_ERROR: Final = 1e-6
-"""Largest error of a rotation: of each number of its product with its transpose."""
+"""Largest error of a rotation, in the lengths of its rows and in the third as the product of the others."""
 _SHAPES: Final[dict[str, tuple[int, ...]]] = {
     "position": (3,),
     "rotation": (3, 3),
@@ -93,7 +93,7 @@ class Intruder:
     ) -> Wrench:
         """The sand's force and moment at a pose and motion, or at n of them.
 
-        Arguments of n poses go with single ones, which count for each.
+        Arguments of n poses go with single ones, which count for each. Many are shared out over the processors.
 
         Args:
             position: The body's origin [m], shape (3,) or (n, 3).
@@ -104,8 +104,8 @@ class Intruder:
         Raises:
             RftsimError: A number is not finite, a rotation turns nothing, or shapes do not fit one another.
         """
-        many, arrays = _motions(position, rotation, velocity, angular_velocity)
-        out = evaluate.body_wrenches(self._bed, self._packed, *arrays)
+        many, motion = _motions(position, rotation, velocity, angular_velocity)
+        out = evaluate.wrenches_of(self._bed, self._packed, motion)
         return Wrench(out[:, :3], out[:, 3:]) if many else Wrench(out[0, :3], out[0, 3:])
 
 
@@ -140,10 +140,10 @@ def surface_force(
             not finite.
     """
     bed = layout.pack_bed(sand, get_law(law), terrain or FreeSurface(), plane)
-    many, arrays = _motions(position, rotation, velocity, angular_velocity)
+    many, motion = _motions(position, rotation, velocity, angular_velocity)
     if many:
         raise RftsimError("surface_force takes one pose: Intruder(surface, sand, law).wrench(...) takes many")
-    place, turn, v, omega = (array[0] for array in arrays)
+    place, turn, v, omega = motion[:3], motion[3:12].reshape(3, 3), motion[12:15], motion[15:]
     stress, depth = evaluate.triangle_stresses(bed, layout.pack_surface(surface), place, turn, v, omega)
     force = stress.T @ surface.areas
     moment = np.cross(surface.centres, stress).T @ surface.areas
@@ -152,11 +152,11 @@ def surface_force(
     return SurfaceForce(force, moment, stress, depth, active, power=float(force @ v + moment @ omega))
 
 
-def _motions(*given: ArrayLike) -> tuple[bool, list[Array]]:
-    """Whether there are many poses, and positions, rotations, velocities and spins of each, as `body_wrenches` takes.
+def _motions(*given: ArrayLike) -> tuple[bool, Array]:
+    """Whether there are many poses, and the numbers of all, as `evaluate.wrenches_of` takes them.
 
     Raises:
-        RftsimError: One of them is wrong.
+        RftsimError: Positions, rotations, velocities and spins do not have the right shapes, or are none.
     """
     arrays = [np.asarray(value, dtype=float) for value in given]
     many = {}
@@ -165,21 +165,32 @@ def _motions(*given: ArrayLike) -> tuple[bool, list[Array]]:
             if array.ndim != len(shape) + 1 or array.shape[1:] != shape:
                 raise RftsimError(f"{name} must have the shape {shape}, or (n, ...) for n poses, not {array.shape}")
             many[name] = len(array)
-        if not math.isfinite(array.sum()) and not np.isfinite(array).all():
-            raise RftsimError(f"{name} must be finite, and one number is {array[~np.isfinite(array)][0]}")
-    if len(set(many.values())) > 1:
-        said = ", ".join(f"{count} of {name}" for name, count in many.items())
-        raise RftsimError(f"of poses and motions there must be as many each, or one, not {said}")
-    if given[1] is not _UPRIGHT:
-        _check_rotations(arrays[1].reshape(-1, 3, 3))
-    count = next(iter(many.values()), 1)
-    full = [np.empty((count, *shape)) for shape in _SHAPES.values()]
-    for out, array in zip(full, arrays, strict=True):
-        out[:] = array
-    return bool(many), full
+    if many:
+        if len(set(many.values())) > 1:
+            said = ", ".join(f"{count} of {name}" for name, count in many.items())
+            raise RftsimError(f"of poses and motions there must be as many each, or one, not {said}")
+        shapes = zip(arrays, _SHAPES.values(), strict=True)
+        arrays = [np.broadcast_to(array, (next(iter(many.values())), *shape)) for array, shape in shapes]
+    motion = np.concatenate([array.ravel() for array in arrays])
+    if not math.isfinite(motion.sum()):
+        for name, array in zip(_SHAPES, arrays, strict=True):
+            if not np.isfinite(array).all():
+                raise RftsimError(f"{name} must be finite, and one number is {array[~np.isfinite(array)][0]}")
+    if given[1] is not _UPRIGHT and motion.size:
+        turns = arrays[1].reshape(-1, 9)
+        error = np.max(_rotation_errors(*(turns.T if many else turns[0].tolist())))
+        if not error < ROTATION_ERROR:
+            raise RftsimError(f"rotation must be orthogonal and right-handed, from which one is {error:.1e} off")
+    return bool(many), motion
 
 
-def _check_rotations(turns: Array) -> None:
-    error = np.abs(turns @ turns.transpose(0, 2, 1) - np.eye(3)).max(initial=0.0)
-    if error > ROTATION_ERROR or (np.linalg.det(turns) < 0.0).any():
-        raise RftsimError(f"rotation must be orthogonal and right-handed: R R' is off by {error:.1e}, or it mirrors")
+def _rotation_errors(a0: Any, a1: Any, a2: Any, b0: Any, b1: Any, b2: Any, c0: Any, c1: Any, c2: Any) -> list[Any]:
+    """How far rows a, b and c are from unit length, and c from a x b; of one rotation, or of arrays of them."""
+    return [
+        abs(a0 * a0 + a1 * a1 + a2 * a2 - 1.0),
+        abs(b0 * b0 + b1 * b1 + b2 * b2 - 1.0),
+        abs(c0 * c0 + c1 * c1 + c2 * c2 - 1.0),
+        abs(a1 * b2 - a2 * b1 - c0),
+        abs(a2 * b0 - a0 * b2 - c1),
+        abs(a0 * b1 - a1 * b0 - c2),
+    ]

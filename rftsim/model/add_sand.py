@@ -167,8 +167,7 @@ def add_sand(
     wheeled = rolling(draft.model, felt.surfaces, wheels if isinstance(wheels, Mapping) else _names(wheels))
     felt.surfaces.update(wheeled if bed_law.dynamic else {})
     economies = economise(draft.model, felt, numbers, reduction) if reduction else {}
-    reach = max(surface.size for surface in felt.surfaces.values())
-    floors = find_floors(draft.model, draft.data, site.terrain, reach)
+    floors = find_floors(draft.model, draft.data, site.terrain, max(s.size for s in felt.surfaces.values()))
     check_sensors(spec, felt.surfaces if sensors else ())
     if draw:
         check_drawing(spec, name)

@@ -51,7 +51,7 @@ def sphere(radius: float, max_edge: float | None = None) -> Surface:
 
 
 def cylinder(radius: float, length: float, max_edge: float | None = None) -> Surface:
-    """A cylinder about z.
+    """A cylinder whose axis is that of z.
 
     Args:
         radius: Its radius [m].

@@ -37,17 +37,18 @@ def doubts_of(mjcf, option="", sand=SAND, **options):
 @pytest.mark.parametrize("field", ["geom_size", "geom_pos", "geom_quat", "geom_type", "geom_contype"])
 def test_geoms_changed_in_place_are_said_once(field):
     """A geom that is resized, moved, turned, made another or uncoupled keeps its surface: one line, one time."""
-    model = model_of(FOOT.replace("mass", 'quat=".9 .1 0 0" mass') + '<body><freejoint/><geom size=".1"/></body>')
+    two = FOOT.replace("mass", 'quat=".9 .1 0 0" mass').replace("</body>", '<geom size=".1" pos="0 0 .2"/></body>')
+    model = model_of(two + '<body><freejoint/><geom size=".1"/></body>')
+    sole = model.geom("sole").id
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     assert told(lambda: wrenches(model, data)) == []
     if field == "geom_type":
-        model.geom_type[0] = mujoco.mjtGeom.mjGEOM_ELLIPSOID
+        model.geom_type[sole] = mujoco.mjtGeom.mjGEOM_ELLIPSOID
     elif field == "geom_contype":
-        model.geom_contype[0] = model.geom_conaffinity[0] = 0
-        model.geom_size[0] *= 1.01
+        model.geom_contype[sole] = model.geom_conaffinity[sole] = 0
     else:
-        getattr(model, field)[0, -1] += 0.01
+        getattr(model, field)[sole, -1] += 0.001
     (doubt,) = told(lambda: wrenches(model, data))
     assert "geoms of foot were changed after the sand was added" in doubt
     assert told(lambda: (wrenches(model, data), tractions(model, data, "foot"))) == []
@@ -104,10 +105,9 @@ def test_attached_and_saved_models_are_as_they_were(tmp_path):
     parent = mujoco.MjSpec()
     parent.attach(child, prefix="a-", frame=parent.worldbody.add_frame(pos=[1, 0, 0], quat=[1, 0, 0, 1]))
     path = tmp_path / "whole.xml"
-    for model in (parent.compile(), spec_of(FOOT).compile()):
-        mujoco.mj_saveLastXML(str(path), model)
+    attached = parent.compile()
     path.write_text(parent.to_xml())
-    for model in (parent.compile(), mujoco.MjModel.from_xml_path(str(path))):
+    for model in (attached, mujoco.MjModel.from_xml_path(str(path))):
         data = mujoco.MjData(model)
         assert told(lambda m=model, d=data: wrenches(m, d)) == []
 

@@ -79,7 +79,7 @@ def test_force_on_lugs(sunk):
     motion = {"position": (0, 0, -0.05), "velocity": (0.05, 0, -0.02), "angular_velocity": (0, 1.0, 0)}
     lying = {"rotation": about((1, 0, 0), np.pi / 2), **motion}
     (force, moment), (whole, turning), (bare, _) = (
-        surface_force(surface.refined(0.002), SAND, **lying)[:2]
+        surface_force(surface.refined(0.004), SAND, **lying)[:2]
         for surface in (surface_of(wheel(sunk), 3), outline(sunk), surface_of(wheel(sunk)[:1]))
     )
     np.testing.assert_allclose(force, whole, rtol=0, atol=2e-3 * np.abs(whole).max())
