@@ -88,8 +88,7 @@ def _instance(model: mujoco.MjModel, by_name: dict[str, int], instance: int, bod
     if marked is None or numbers is None or numbers.size != seal.BED_NUMBERS + seal.SEAL_NUMBERS:
         raise SceneError(f"the model lacks the numbers of its bed {name!r}: make it anew with rftsim.add_sand")
     packed, behind = numbers[: seal.BED_NUMBERS], numbers[seal.BED_NUMBERS :]
-    owns = (seal.own_name(name, start, behind) for start in range(len(name) + 1))
-    if not any(seal.is_sealed(packed[seal.SEALED], behind, own) for own in dict.fromkeys(owns)):
+    if not any(seal.is_sealed(packed[seal.SEALED], behind, own) for own in seal.own_names(name, behind)):
         raise SceneError(f"the law of bed {name!r}, or its numbers' place, was changed: make the model anew")
     return Instance(instance, name, int(model.numeric_adr[by_name[marked]]), packed, bodies)
 
@@ -170,6 +169,7 @@ def tractions(model: mujoco.MjModel, data: mujoco.MjData, body: "int | str") -> 
     else:
         raise SceneError(f"body {model.body(index).name!r} does not feel sand")
     surface = bed.bodies[index]
+    _check_seal(model, bed, index)
     velocity, omega = body_velocities(model, data)
     rotation = data.xmat[index].reshape(3, 3)
     stress, depth = evaluate.triangle_stresses(
@@ -185,6 +185,16 @@ def tractions(model: mujoco.MjModel, data: mujoco.MjData, body: "int | str") -> 
         stress=stress @ rotation.T,
         active=(depth > 0.0) & stress.any(axis=1),
     )
+
+
+def _check_seal(model: mujoco.MjModel, bed: Instance, body: int) -> None:
+    """Refuse a surface of which a number was changed."""
+    owner, surface, numbers = model.body(body).name, bed.bodies[body], model.numeric_data
+    start = (surface.ctypes.data - numbers.ctypes.data) // 8 + surface.size
+    behind, of_bed = numbers[start : start + seal.SEAL_NUMBERS], numbers[bed.start + seal.BED_NUMBERS :]
+    names = (own + name for own in seal.own_names(owner, behind) for name in seal.own_names(bed.name, of_bed))
+    if not any(seal.is_sealed(surface, behind, name) for name in names):
+        raise SceneError(f"the surface of body {owner!r} was changed in the model: make it anew with rftsim.add_sand")
 
 
 def body_velocities(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[Array, Array]:
