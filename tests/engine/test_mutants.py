@@ -42,7 +42,7 @@ def check(found):
 @forks
 def test_mutated_models(bases):
     """Each is refused in one line, or has the force of what was written, or MuJoCo warns of its NaN."""
-    check(outcomes(bases, 0, 150))
+    check(outcomes(bases, 0, 100))
 
 
 @forks
