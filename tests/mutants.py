@@ -2,6 +2,7 @@
 
 import contextlib
 import copy
+import faulthandler
 import os
 import pickle
 import select
@@ -169,6 +170,7 @@ def in_process(function, *arguments):
 
 def _silently(work):
     """Do something in a child, whose log goes nowhere, and end it at once."""
+    faulthandler.disable()
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, 2)
     os.dup2(nowhere, 1)

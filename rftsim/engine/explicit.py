@@ -25,6 +25,7 @@ def press(model, data, m, d, number, is_for_implicit):
         x = t.xpos[3 * body : 3 * body + 3]
         r = t.xmat[9 * body : 9 * body + 9].ctypes.data
         f = instance.wrench(address, k)
+        instance.leave_open(f)
         exports.wrench(sand, surface, x.ctypes.data, r, v.ctypes.data, w.ctypes.data, f.ctypes.data)
         bodies.add_wrench(t, body, x, (f[0], f[1], f[2]), (f[3], f[4], f[5]), force)
     instance.count(address, 1.0)

@@ -111,16 +111,19 @@ def bed(model, m, address):
 
 
 @exact
+def leave_open(numbers):
+    """Fill numbers with NaN, in place."""
+    for i in range(numbers.size):
+        numbers[i] = np.nan
+
+
+@exact
 def spoil(model, data, m, d, instance, address, why):
     """Make the force of an instance NaN, which MuJoCo warns about, and say once why; see WHY."""
-    force = doubles(pointer(d + data.qfrc_passive), pointer(m + model.nv))
-    for i in range(force.size):
-        force[i] = np.nan
+    leave_open(doubles(pointer(d + data.qfrc_passive), pointer(m + model.nv)))
     if address == 0:
         return
-    wrenches = all_wrenches(address)
-    for i in range(wrenches.size):
-        wrenches[i] = np.nan
+    leave_open(all_wrenches(address))
     if head(address).has_complained == 0:
         head(address).has_complained = 1
         external.warn(why, name(model, m, instance))

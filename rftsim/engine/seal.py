@@ -49,7 +49,7 @@ SEALED: Final = np.array(
     sorted(k for name in ("response", "plane", "dynamic", "table") for k in _places(name)), dtype=np.int64
 )
 """Places of the numbers of a bed that its seal covers."""
-WEIGHED: Final = 64
+WEIGHED: Final = 256
 """Numbers that are weighed together at each step, to see whether they were changed."""
 WEIGHTS: Final = 0.5 + np.arange(1, 1 + WEIGHED) * (5**0.5 - 1) / 2 % 1.0
 """Weights of their places."""
@@ -81,7 +81,7 @@ def sealed_surface(surface: Array, body: str, bed: str) -> Array:
     return np.concatenate([surface, _seal(surface, body, body + bed)])
 
 
-def is_sealed(numbers: Array, seal: Array, names: str) -> bool:
+def is_sealed(numbers: Array, seal: Array, names: bytes) -> bool:
     """Whether a seal is that of numbers and names, exactly or as printed.
 
     Args:
@@ -89,14 +89,14 @@ def is_sealed(numbers: Array, seal: Array, names: str) -> bool:
         seal: The numbers behind it, a record of SEAL.
         names: The owner's own name, and the bed's behind that of a body.
     """
-    digest = _pieces(_digest(numbers, names.encode()))
-    return digest in (seal[1:5].tolist(), seal[5:9].tolist())
+    return _pieces(_digest(numbers, names)) in (seal[1:5].tolist(), seal[5:9].tolist())
 
 
-def own_name(owner: str, start: int, seal: Array) -> str:
-    """An owner's own name, which stood behind the marker at a place of its name before any attachment."""
-    length = int(seal[0]) if 0 <= seal[0] < LONGEST else 0
-    return owner.encode()[len(owner[:start].encode()) :][:length].decode(errors="replace")
+def own_names(owner: str, seal: Array) -> list[bytes]:
+    """All that an owner's own name can have been before any attachment, by the length that its seal says."""
+    name = owner.encode()
+    length = int(seal[0]) if 0 <= seal[0] <= len(name) else len(name)
+    return [name[start : start + length] for start in range(len(name) - length + 1)]
 
 
 def _seal(numbers: Array, name: str, names: str) -> Array:

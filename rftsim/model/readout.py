@@ -1,5 +1,6 @@
 """The sand's action on a model's bodies, read from the model and its data."""
 
+import weakref
 from typing import Any, NamedTuple
 
 import mujoco
@@ -9,7 +10,7 @@ from rftsim.engine import seal
 from rftsim.engine.block import BODY_MARKER, MORE_MARKER, SAND_MARKER, read_block
 from rftsim.errors import SceneError
 from rftsim.law import evaluate, layout
-from rftsim.model.stale import tell_stale
+from rftsim.model.stale import fingerprint, tell_stale
 from rftsim.model.write import DRAWING_MARKER
 from rftsim.surface.triangles import Array
 
@@ -89,8 +90,7 @@ def _instance(model: mujoco.MjModel, by_name: dict[str, int], instance: int, bod
     if marked is None or numbers is None or numbers.size != seal.BED_NUMBERS + seal.SEAL_NUMBERS:
         raise SceneError(f"the model lacks the numbers of its bed {name!r}: make it anew with rftsim.add_sand")
     packed, behind = numbers[: seal.BED_NUMBERS], numbers[seal.BED_NUMBERS :]
-    owns = (seal.own_name(name, start, behind) for start in range(len(name) + 1))
-    if not any(seal.is_sealed(packed[seal.SEALED], behind, own) for own in dict.fromkeys(owns)):
+    if not any(seal.is_sealed(packed[seal.SEALED], behind, own) for own in seal.own_names(name, behind)):
         raise SceneError(f"the law of bed {name!r}, or its numbers' place, was changed: make the model anew")
     return Instance(instance, name, int(model.numeric_adr[by_name[marked]]), packed, bodies)
 
@@ -144,6 +144,20 @@ def _end(by_name: dict[str, int], i: int, before: str, after: str) -> int:
     return end
 
 
+_known: "weakref.WeakKeyDictionary[mujoco.MjModel, tuple[Any, list[int]]]" = weakref.WeakKeyDictionary()
+"""Of each model the numbers that it had when it was looked at, and the ids of its beds."""
+
+
+def _looked_at(model: mujoco.MjModel) -> list[int]:
+    """Ids of a model's beds, which are looked at anew, and their doubts told, where the model's numbers changed."""
+    numbers, known = fingerprint(model), _known.get(model)
+    if known is None or known[0] != numbers:
+        beds = instances(model)
+        tell_stale(model, [item for bed in beds for item in bed.bodies.items()])
+        known = _known[model] = numbers, [bed.id for bed in beds]
+    return known[1]
+
+
 def wrenches(model: mujoco.MjModel, data: mujoco.MjData) -> Wrenches:
     """Force and moment of the sand on each body, as found in the last mj_forward or mj_step of `data`.
 
@@ -151,10 +165,8 @@ def wrenches(model: mujoco.MjModel, data: mujoco.MjData) -> Wrenches:
     of a split one; what MuJoCo is handed then is the generalised force that ends the step in the same place.
     """
     force, moment = np.zeros((model.nbody, 3)), np.zeros((model.nbody, 3))
-    beds = instances(model)
-    tell_stale(model, [item for bed in beds for item in bed.bodies.items()])
-    for bed in beds:
-        block = read_block(data.plugin_data, data._address, bed.id)
+    for bed in _looked_at(model):
+        block = read_block(data.plugin_data, data._address, bed)
         force[block.bodies], moment[block.bodies] = block.wrenches[:, :3], block.wrenches[:, 3:]
     velocity, omega = body_velocities(model, data)
     return Wrenches(force, moment, np.einsum("ij,ij->i", force, velocity) + np.einsum("ij,ij->i", moment, omega))
@@ -174,6 +186,7 @@ def tractions(model: mujoco.MjModel, data: mujoco.MjData, body: "int | str") -> 
         raise SceneError(f"body {model.body(index).name!r} does not feel sand")
     surface = bed.bodies[index]
     tell_stale(model, [(index, surface)])
+    _check_seal(model, bed, index)
     velocity, omega = body_velocities(model, data)
     rotation = data.xmat[index].reshape(3, 3)
     stress, depth = evaluate.triangle_stresses(
@@ -189,6 +202,16 @@ def tractions(model: mujoco.MjModel, data: mujoco.MjData, body: "int | str") -> 
         stress=stress @ rotation.T,
         active=evaluate.acts(bed.packed, normal, rotation, stress, depth),
     )
+
+
+def _check_seal(model: mujoco.MjModel, bed: Instance, body: int) -> None:
+    """Refuse a surface of which a number was changed."""
+    owner, surface, numbers = model.body(body).name, bed.bodies[body], model.numeric_data
+    start = (surface.ctypes.data - numbers.ctypes.data) // 8 + surface.size
+    behind, of_bed = numbers[start : start + seal.SEAL_NUMBERS], numbers[bed.start + seal.BED_NUMBERS :]
+    names = (own + name for own in seal.own_names(owner, behind) for name in seal.own_names(bed.name, of_bed))
+    if not any(seal.is_sealed(surface, behind, name) for name in names):
+        raise SceneError(f"the surface of body {owner!r} was changed in the model: make it anew with rftsim.add_sand")
 
 
 def body_velocities(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[Array, Array]:

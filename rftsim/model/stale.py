@@ -71,6 +71,14 @@ def stale_doubts(model: mujoco.MjModel, surfaces: Iterable[tuple[int, Array]]) -
     return doubts
 
 
+def fingerprint(model: mujoco.MjModel) -> tuple[Any, ...]:
+    """What changes with every number that a bed, its surfaces or their doubts depend on; taken in microseconds."""
+    geoms = (model.geom_type, model.geom_size, model.geom_pos, model.geom_quat, model.geom_contype)
+    more = (model.geom_conaffinity, model.geom_dataid, model.body_plugin, model.opt.gravity)
+    sums = float(model.mesh_vert.sum()), float(model.numeric_data.sum())
+    return *(array.tobytes() for array in (*geoms, *more)), *sums
+
+
 def _numbers(model: mujoco.MjModel, body: int) -> tuple[float, float]:
     """A length that changes with each number of the geoms that bound a body, and the size of what it is summed from."""
     parts: list[Any] = []

@@ -42,7 +42,7 @@ def check(found):
 @forks
 def test_mutated_models(bases):
     """Each is refused in one line, or has the force of what was written, or MuJoCo warns of its NaN."""
-    check(outcomes(bases, 0, 150))
+    check(outcomes(bases, 0, 100))
 
 
 @forks
@@ -108,6 +108,8 @@ def test_edits_of_what_is_sealed(force, place):
     assert np.isnan(data.qfrc_passive).all()
     with pytest.raises(mujoco.FatalError, match="written"):
         mujoco.MjData(model)
+    with pytest.raises(SceneError, match="was changed"):
+        tractions(model, data, "ball")
 
 
 @pytest.mark.parametrize("force", ["explicit", "implicit"])
@@ -143,6 +145,15 @@ def test_state_that_is_none():
     mujoco.mj_resetData(model, data)
     mujoco.mj_forward(model, data)
     assert np.isfinite(data.qfrc_passive).all()
+
+
+def test_a_step_that_cannot_be_solved_is_no_force():
+    """Without a time step there is no force at its end: NaN, and what was in memory is not taken for one."""
+    model = sandy(force="implicit")
+    data = shaken(model)
+    model.opt.timestep = 0.0
+    mujoco.mj_forward(model, data)
+    assert np.isnan(data.qfrc_passive).all()
 
 
 def test_bodies_whose_names_are_numbers():
