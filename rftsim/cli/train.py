@@ -145,14 +145,14 @@ def _said(steps: int, began: int, done: bool, out: Path) -> str:
 @contextlib.contextmanager
 def interruptible() -> Iterator[Callable[[], bool]]:
     """Make the first Ctrl-C, or SIGTERM, a question that the block answers; a second one ends it, as ever."""
-    asked = False
+    asked, numbers = False, (signal.SIGINT, signal.SIGTERM)
 
     def ask(number: int, frame: object) -> None:
         nonlocal asked
         asked = True
-        signal.signal(number, before[number])
+        signal.signal(number, before[signal.Signals(number)])
 
-    before = {number: signal.signal(number, ask) for number in (signal.SIGINT, signal.SIGTERM)}
+    before = {number: signal.signal(number, ask) for number in numbers}
     try:
         yield lambda: asked
     finally:
