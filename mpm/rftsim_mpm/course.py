@@ -12,7 +12,7 @@ from rftsim_mpm.bed import level_bed
 from rftsim_mpm.body import Body
 from rftsim_mpm.errors import MpmError
 from rftsim_mpm.material import Material
-from rftsim_mpm.reading import History, Log, read
+from rftsim_mpm.reading import AVERAGE, FEWEST, History, Log, read
 from rftsim_mpm.shapes import Shape
 from rftsim_mpm.simulation import COURANT, MOST_STEPS, Simulation, Watch
 
@@ -64,7 +64,16 @@ class Course:
         return math.ceil(self.bed / self.dx) * self.dx
 
     def prepare(self) -> Simulation:
-        """Return the bed with the body at the start of its way."""
+        """Return the bed with the body at the start of its way.
+
+        Raises:
+            MpmError: The bed is too large, or the way too slow or too fast to be read.
+        """
+        if 2.0 * self.window < (FEWEST - 1) * AVERAGE * self.speed:
+            raise MpmError(
+                f"at {self.speed:g} m/s the {2e3 * self.window:g} mm that are read hold fewer than {FEWEST} averages "
+                f"of {AVERAGE * 1e3:g} ms: go slower"
+            )
         dx, dim = self.dx, self.shape.dim
         reach = np.abs(self.shape.vertices @ self.rotation.T).max(axis=0)
         beside = [math.ceil((self.margin + r) / dx) for r in reach[: dim - 1]]  # cells from the body's middle to a wall

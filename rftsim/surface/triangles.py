@@ -21,6 +21,8 @@ EDGE_ON_SINGLE: Final = 1e-6
 
 LARGEST_FILE: Final = 64_000_000
 """Size of a mesh's file that is still read [byte]: binary STL of a million triangles."""
+FARTHEST: Final = 1e6
+"""Largest coordinate of a mesh's file [m]."""
 LARGEST: Final = 20.0
 """Size of a body above which its mesh is suspected to be in other units [m]."""
 SMALLEST: Final = 1e-3
@@ -221,7 +223,11 @@ def load_surface(path: "str | Path", *, scale: float = 1.0, allow_open: bool = F
         raise SurfaceError(f"cannot read the mesh {path}: {type(error).__name__}: {error}") from error
     if not isinstance(mesh, trimesh.Trimesh):
         raise SurfaceError(f"{path} holds no triangle mesh")
-    return make_surface(mesh.vertices * scale, mesh.faces, name=path.name, allow_open=allow_open)
+    vertices = mesh.vertices * scale
+    farthest = float(np.max(np.abs(vertices), initial=0.0, where=np.isfinite(vertices)))
+    if farthest > FARTHEST:
+        raise SurfaceError(f"{path.name} has a vertex {farthest:g} m from its origin; lengths are in metres")
+    return make_surface(vertices, mesh.faces, name=path.name, allow_open=allow_open)
 
 
 def _point(x: ArrayLike) -> str:
