@@ -17,6 +17,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -246,9 +247,9 @@ def _wait(child: int, began: float) -> tuple[int, float]:
         time.sleep(0.01)
 
 
-def study(commands: int, files: int, seed: int) -> list[Ended]:
+def study(commands: int, files: int, seed: int) -> Iterator[Ended]:
     """Try command lines and files that were spoilt, evenly from each that there is."""
-    rng, found = random.Random(seed), []
+    rng = random.Random(seed)
     with tempfile.TemporaryDirectory() as place:
         for k in range(commands + files):
             folder = Path(place) / f"{k}"
@@ -256,14 +257,13 @@ def study(commands: int, files: int, seed: int) -> list[Ended]:
             make_files(folder)
             if k < commands:
                 words = spoil_words(rng, COMMANDS[k % len(COMMANDS)].split())
-                found.append(attempt(words, folder))
+                yield attempt(words, folder)
                 continue
             name = list(FILES)[k % len(FILES)]
             content = spoil_bytes(rng, (folder / name).read_bytes())
             (folder / name).write_bytes(content)
             ended = attempt(FILES[name].split(), folder)
-            found.append(ended._replace(words=[*ended.words, f"# {name} = {content[:150]!r}"]))
-    return found
+            yield ended._replace(words=[*ended.words, f"# {name} = {content[:150]!r}"])
 
 
 def main() -> int:
@@ -275,11 +275,13 @@ def main() -> int:
     for module in PRELOADED:
         importlib.import_module(module)
     own = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    found = study(given.commands, given.files, given.seed)
+    found = []
+    for one in study(given.commands, given.files, given.seed):
+        found.append(one)
+        if one.faults:
+            print(f"{'; '.join(one.faults)}: {' '.join(word[:200] for word in one.words)}")
+            print("".join(f"    {line[:200]}\n" for line in one.lines[-4:]), end="", flush=True)
     faulty = [one for one in found if one.faults]
-    for one in faulty:
-        print(f"{'; '.join(one.faults)}: {' '.join(word[:80] for word in one.words)}")
-        print("".join(f"    {line[:200]}\n" for line in one.lines[-4:]), end="")
     codes = ", ".join(f"{count} with {code}" for code, count in sorted(Counter(one.code for one in found).items()))
     print(f"{len(found)} trials, {len(faulty)} faulty: {codes}")
     print(
