@@ -8,11 +8,15 @@ import shutil
 import tempfile
 import tomllib
 import warnings
+import zipfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from rftsim.errors import RftsimError, RftsimWarning
+
+PACKED: Final = (b"\x1f\x8b", b"BZh", b"\xfd7zX")
+"""Beginnings of files that gzip, bzip2 and xz have packed."""
 
 
 @contextlib.contextmanager
@@ -63,12 +67,13 @@ def check_writable(path: Path, *suffixes: str) -> None:
         raise RftsimError(f"cannot write to {path.parent}")
 
 
-def read_toml(path: Path, what: str) -> dict[str, Any]:
+def read_toml(path: Path, what: str, refuse: type[RftsimError] = RftsimError) -> dict[str, Any]:
     """The tables of a TOML file.
 
     Args:
         path: The file.
         what: What it should be, for errors: `sand`.
+        refuse: Kind of the errors that are raised.
 
     Raises:
         RftsimError: It cannot be read, or is no TOML.
@@ -76,11 +81,29 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
     try:
         return tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
-        raise RftsimError(f"cannot read the {what} file {path}: {error.strerror}") from None
+        raise refuse(f"cannot read the {what} file {path}: {error.strerror}") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise RftsimError(f"the {what} file {path} is not TOML: {error}") from None
+        raise refuse(f"the {what} file {path} is not TOML: {error}") from None
     except (RecursionError, ValueError):  # brackets within brackets, and whole numbers of thousands of digits
-        raise RftsimError(f"the {what} file {path} is nested too deeply, or has a number too long to be read") from None
+        raise refuse(f"the {what} file {path} is nested too deeply, or has a number too long to be read") from None
+
+
+def check_size(path: Path, largest: int) -> None:
+    """Refuse a file that is larger, packed or unpacked, than `largest` [byte].
+
+    Raises:
+        RftsimError: It is larger, or packed in a way that does not say how large it is.
+    """
+    with path.open("rb") as file:
+        start = file.read(4)
+    size = path.stat().st_size
+    if start.startswith(PACKED):
+        raise RftsimError(f"{path} is a packed file: unpack it first")
+    if zipfile.is_zipfile(path):
+        with zipfile.ZipFile(path) as archive:
+            size = max(size, sum(entry.file_size for entry in archive.infolist()))
+    if size > largest:
+        raise RftsimError(f"{path} has {size / 1e6:.0f} MB, which is more than the {largest / 1e6:.0f} that are read")
 
 
 class Kept:

@@ -11,6 +11,9 @@ from rftsim_mpm.material import Material
 
 Array = NDArray[np.float64]
 
+MOST_PARTICLES = 10_000_000
+"""Most particles of a bed, some 3 GB."""
+
 
 @dataclasses.dataclass
 class Particles:
@@ -110,6 +113,11 @@ def level_bed(
     if any(c < 1 or abs(c * dx - s) > 1e-6 * s for c, s in zip(cells, size, strict=True)):
         raise MpmError(f"a bed of {' x '.join(f'{s:g}' for s in size)} m is not made of whole cells of {dx:g} m")
     dim = len(size)
+    if math.prod(cells) * ppc**dim > MOST_PARTICLES:
+        raise MpmError(
+            f"a bed of {' x '.join(map(str, cells))} cells has more than {MOST_PARTICLES:g} particles: "
+            "take larger cells, or less sand"
+        )
     axes = [(np.arange(ppc * c) + 0.5) * (dx / ppc) for c in cells]
     x = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, dim)
     n = len(x)

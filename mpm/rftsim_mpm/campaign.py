@@ -10,6 +10,7 @@ import fcntl
 import hashlib
 import itertools
 import json
+import math
 import os
 import subprocess
 import sys
@@ -31,6 +32,8 @@ Job = Plate | Push | Wheel
 KINDS: dict[str, type[Job]] = {"plates": Plate, "pushes": Push, "wheels": Wheel}
 """The kinds of jobs by their names in files."""
 
+MOST_JOBS = 100_000
+"""Most jobs of one file."""
 DATA = Path(__file__).parent / "data"
 """Campaigns that are shipped: `plates`, `flat`, `solids`, `deep`, `rates` and `wheels`."""
 
@@ -55,14 +58,17 @@ def read_jobs(path: Path) -> list[Job]:
         MpmError: The file is missing, is no TOML, names what a job does not have, or a job cannot be.
     """
     try:
-        text = tomllib.loads(path.read_text())
+        text = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise MpmError(f"cannot read {path}: {error.strerror}") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise MpmError(f"{path} is not TOML: {error}") from error
+    except (RecursionError, ValueError) as error:  # brackets within brackets, and numbers of thousands of digits
+        raise MpmError(f"{path} is nested too deeply, or has a number too long to be read") from error
     defaults = text.pop("defaults", {})
     grids = [(name, grid) for name in KINDS if isinstance(text.get(name), list) for grid in text[name]]
-    if not isinstance(defaults, dict) or not grids or set(text) - set(KINDS):
+    tables = isinstance(defaults, dict) and all(isinstance(grid, dict) for _, grid in grids)
+    if not tables or not grids or set(text) - set(KINDS):
         raise MpmError(
             f"{path} must have one or more [[{']] or [['.join(KINDS)}]], and may have [defaults], and nothing else"
         )
@@ -74,6 +80,8 @@ def read_jobs(path: Path) -> list[Job]:
                 f"{path}: one of [[{name}]] has no {', '.join(sorted(unknown))}; it has {', '.join(sorted(known))}"
             )
         axes = {name: value if isinstance(value, list) else [value] for name, value in (defaults | grid).items()}
+        if len(found) + math.prod(map(len, axes.values())) > MOST_JOBS:
+            raise MpmError(f"{path} asks for more than {MOST_JOBS} jobs")
         for values in itertools.product(*axes.values()):
             job = _job(KINDS[name], dict(zip(axes, values, strict=True)), str(path))
             found[key(job)] = job
@@ -89,6 +97,8 @@ def _job(kind: type[Job], values: dict[str, Any], where: str) -> Job:
         )
         if not (isinstance(value, str) if wanted is str else numbers):
             raise MpmError(f"{where}: {name} cannot be {value!r}")
+        if wanted is not str and abs(value) > sys.float_info.max:
+            raise MpmError(f"{where}: {name} is too large for a number")
         values[name] = float(value) if wanted is float else value
     try:
         return kind(**values)
@@ -135,6 +145,10 @@ def manifest(folder: Path) -> list[Job]:
         raise MpmError(f"{folder} is no campaign: cannot read {path.name} ({error.strerror})") from error
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise MpmError(f"{path} is damaged: {error}; run the campaign's TOML file again") from error
+    except RecursionError as error:
+        raise MpmError(f"{path} is damaged: it is nested too deeply; run the campaign's TOML file again") from error
+    if not jobs:
+        raise MpmError(f"{path} has no jobs: run the campaign's TOML file again")
     return jobs
 
 
@@ -153,9 +167,9 @@ def is_intact(path: Path, job: Job) -> bool:
     try:
         text = json.loads(path.read_text())
         checksum = text.pop("sha256")
-    except (OSError, ValueError, KeyError, AttributeError):
+        return bool(checksum == _checksum(text) and text[_name(job)] == dataclasses.asdict(job))
+    except (OSError, ValueError, KeyError, AttributeError, TypeError, RecursionError):
         return False
-    return bool(checksum == _checksum(text) and text[_name(job)] == dataclasses.asdict(job))
 
 
 def _name(job: Job) -> str:

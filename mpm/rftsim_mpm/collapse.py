@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rftsim_mpm.bed import level_bed
-from rftsim_mpm.errors import MpmError
+from rftsim_mpm.errors import MpmError, check_positive
 from rftsim_mpm.fields import Frame
 from rftsim_mpm.follow import follow
 from rftsim_mpm.material import Material, stiffness
@@ -39,8 +39,7 @@ class Collapse:
             raise MpmError(f"aspects must be positive, not {self.aspects}")
         if self.cells < 4:
             raise MpmError(f"cells must be at least 4, not {self.cells}")
-        if not (self.half_width > 0.0 and self.mu_int > 0.0 and self.rho > 0.0):
-            raise MpmError("half_width, mu_int and rho must be positive")
+        check_positive(self, "half_width", "mu_int", "rho")
 
 
 class Runout(NamedTuple):

@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from rftsim_mpm.bed import level_bed
 from rftsim_mpm.body import Body
+from rftsim_mpm.errors import MpmError
 from rftsim_mpm.material import Material
-from rftsim_mpm.reading import History, Log, read
+from rftsim_mpm.reading import AVERAGE, FEWEST, History, Log, read
 from rftsim_mpm.shapes import Shape
-from rftsim_mpm.simulation import COURANT, Simulation, Watch
+from rftsim_mpm.simulation import COURANT, MOST_STEPS, Simulation, Watch
 
 Array = NDArray[np.float64]
 
@@ -63,7 +64,16 @@ class Course:
         return math.ceil(self.bed / self.dx) * self.dx
 
     def prepare(self) -> Simulation:
-        """Return the bed with the body at the start of its way."""
+        """Return the bed with the body at the start of its way.
+
+        Raises:
+            MpmError: The bed is too large, or the way too slow or too fast to be read.
+        """
+        if 2.0 * self.window < (FEWEST - 1) * AVERAGE * self.speed:
+            raise MpmError(
+                f"at {self.speed:g} m/s the {2e3 * self.window:g} mm that are read hold fewer than {FEWEST} averages "
+                f"of {AVERAGE * 1e3:g} ms: go slower"
+            )
         dx, dim = self.dx, self.shape.dim
         reach = np.abs(self.shape.vertices @ self.rotation.T).max(axis=0)
         beside = [math.ceil((self.margin + r) / dx) for r in reach[: dim - 1]]  # cells from the body's middle to a wall
@@ -80,6 +90,8 @@ class Course:
         body = Body(self.shape, start, self.speed * self.direction, self.friction, self.rotation)
         bed = level_bed(self.material, (*(n * dx for n in width), self.level), dx, ppc=self.ppc)
         dt = self.courant * dx / self.material.wave_speed
+        if not (self.approach + self.window) / self.speed <= MOST_STEPS * dt:
+            raise MpmError(f"the way takes more than {MOST_STEPS:g} time steps of {dt:.3g} s: go faster, or less far")
         box = (*(n * dx for n in width), top)
         sim = Simulation(self.material, bed, dx, box, bodies=[body], dt=dt, xpic=self.xpic)
         sim.clear_bodies()

@@ -6,9 +6,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rftsim_mpm.errors import MpmError
 from rftsim_mpm.fields import Camera, Frame
 from rftsim_mpm.reading import AVERAGE
-from rftsim_mpm.simulation import Simulation, Watch
+from rftsim_mpm.simulation import MOST_STEPS, Simulation, Watch
 
 Array = NDArray[np.float64]
 
@@ -47,6 +48,8 @@ def follow(sim: Simulation, duration: float, watch: Watch | None = None, shots: 
         watch: Called after each step with the simulation and the share that is done.
         shots: When to take frames [s]; rates in them are means over the 2 % of the run before.
     """
+    if not duration <= MOST_STEPS * sim.dt:
+        raise MpmError(f"{duration:g} s are more than {MOST_STEPS:g} time steps of {sim.dt:.3g} s")
     due = [*sorted(shots), duration]
     cameras: list[Camera | None] = [None] * len(due)
     frames: list[Frame] = []

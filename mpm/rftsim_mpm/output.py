@@ -2,11 +2,16 @@
 
 import contextlib
 import os
+import shutil
 import tempfile
+import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 
 from rftsim_mpm.errors import MpmError
+
+PACKED = (b"\x1f\x8b", b"BZh", b"\xfd7zX")
+"""Beginnings of files that gzip, bzip2 and xz have packed."""
 
 
 def check_writable(path: Path, *suffixes: str) -> None:
@@ -25,18 +30,48 @@ def check_writable(path: Path, *suffixes: str) -> None:
         raise MpmError(f"cannot write to {path.parent}")
 
 
+def check_size(path: Path, largest: int) -> None:
+    """Refuse a file that is larger, packed or unpacked, than `largest` [byte].
+
+    Raises:
+        MpmError: It is larger, or packed in a way that does not say how large it is.
+    """
+    with path.open("rb") as file:
+        start = file.read(4)
+    size = path.stat().st_size
+    if start.startswith(PACKED):
+        raise MpmError(f"{path} is a packed file: unpack it first")
+    if zipfile.is_zipfile(path):
+        with zipfile.ZipFile(path) as archive:
+            size = max(size, sum(entry.file_size for entry in archive.infolist()))
+    if size > largest:
+        raise MpmError(f"{path} has {size / 1e6:.0f} MB, which is more than the {largest / 1e6:.0f} that are read")
+
+
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Give a temporary file beside `path` that takes its place, on the disk, when the block ends well."""
+    """Give a temporary file that takes the place of `path`, on the disk, when the block ends well.
+
+    Until it is whole it lies in the system's folder of temporary files, so that a process that is killed leaves nothing
+    beside `path`.
+    """
     check_writable(path)
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}-", suffix=path.suffix)
-    os.close(handle)
-    temporary = Path(name)
-    try:
+    with tempfile.TemporaryDirectory(prefix="rftsim-mpm-") as folder:
+        temporary = Path(folder) / path.name
         yield temporary
-        with temporary.open("rb") as written:
-            os.fsync(written.fileno())
-        temporary.chmod(0o644)
-        temporary.replace(path)
+        _put(temporary, path)
+
+
+def _put(whole: Path, path: Path) -> None:
+    """Put a file that is whole in its place, from which other file system it may be."""
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}-", suffix=path.suffix)
+    beside = Path(name)
+    try:
+        with whole.open("rb") as source, open(handle, "wb") as target:
+            shutil.copyfileobj(source, target)
+            target.flush()
+            os.fsync(target.fileno())
+        beside.chmod(0o644)
+        beside.replace(path)
     finally:
-        temporary.unlink(missing_ok=True)
+        beside.unlink(missing_ok=True)

@@ -11,6 +11,8 @@ Array = NDArray[np.float64]
 
 AVERAGE = 0.5e-3
 """Length of the averages [s]."""
+FEWEST = 5
+"""Fewest averages that a force is read from."""
 MOST_POINTS = 100
 """Points of a history that files keep, at the most."""
 
@@ -74,7 +76,7 @@ class Log:
 def read(history: History, travel: float, window: float) -> Reading:
     """Return the force at a travel [m], by a straight line through the averages within `window` [m]."""
     near = np.abs(history.travel - travel) <= window
-    if near.sum() < 5:
+    if near.sum() < FEWEST:
         raise MpmError(
             f"only {near.sum()} averages of {AVERAGE * 1e3:g} ms lie within {window:g} m of {travel:g} m: go slower"
         )

@@ -7,9 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rftsim_mpm.errors import MpmError
+from rftsim_mpm.output import check_size
 from rftsim_mpm.shapes import Shape, mesh, polygon
 
 Array = NDArray[np.float64]
+
+LARGEST = 64_000_000
+"""Size of a mesh's file that is still read [byte]: binary STL of a million triangles."""
 
 
 def load_shape(path: Path, *, scale: float = 1.0) -> Shape:
@@ -30,10 +34,18 @@ def read_mesh(path: Path) -> Any:
     """
     import trimesh  # slow to import, and pictures do not need it
 
+    if not path.is_file():
+        raise MpmError(f"no file {path}")
+    check_size(path, LARGEST)
     try:
-        return trimesh.load_mesh(path)
-    except (OSError, ValueError, NotImplementedError, KeyError, IndexError) as error:
-        raise MpmError(f"cannot read a mesh from {path}: {error}") from error
+        found = trimesh.load_mesh(path)
+    except Exception as error:  # trimesh's readers raise whatever their parsers raise
+        raise MpmError(f"cannot read a mesh from {path}: {type(error).__name__}: {error}") from error
+    if not isinstance(found, trimesh.Trimesh) or not len(found.faces):
+        raise MpmError(f"{path} holds no triangle mesh")
+    if not np.isfinite(found.vertices).all():
+        raise MpmError(f"{path} has a vertex that is not finite")
+    return found
 
 
 def silhouette(path: Path, *, width: float, tolerance: float = 1.5) -> Shape:

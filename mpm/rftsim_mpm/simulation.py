@@ -29,6 +29,10 @@ CONTACT_STIFFNESS = 1.0
 """Stiffness of the contact layer, in Young's moduli per cell: sand sinks in by p / E cells."""
 COURANT = 0.3
 """Time step in cells per compression wave."""
+MOST_STEPS = 1e7
+"""Most time steps of a run."""
+MOST_NODES = 10_000_000
+"""Most nodes of a grid."""
 SORT_EVERY = 80
 """Steps between sorting the particles by cell."""
 
@@ -81,6 +85,10 @@ class Simulation:
         cells = [math.ceil(round(s / dx, 6)) for s in size]
         if len(cells) != dim or min(cells) < 4:
             raise MpmError(f"the box must be at least 4 cells of {dx:g} m along each of {dim} axes, not {cells}")
+        if math.prod(cells) > MOST_NODES:
+            raise MpmError(
+                f"a box of {cells} cells has more than {MOST_NODES:g} nodes: take larger cells, or less room"
+            )
         if xpic < 0:
             raise MpmError(f"xpic must be zero (FLIP) or an order, not {xpic}")
         self.material, self.particles, self.dx, self.bodies = material, particles, dx, list(bodies)

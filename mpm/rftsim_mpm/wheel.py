@@ -64,8 +64,8 @@ class Wheel:
         check_positive(
             self, "duration", "radius", "height", "width", "breadth", "mass_x", "mass_z", "mu_int", "rho", "dx"
         )
-        if self.grousers < 2 or self.grousers * self.width >= 2.0 * math.pi * self.radius:
-            raise MpmError(f"{self.grousers} grousers of {self.width:g} m do not fit on the wheel; 2 at least")
+        if not 2 <= self.grousers <= 1000 or self.grousers * self.width >= 2.0 * math.pi * self.radius:
+            raise MpmError(f"{self.grousers} grousers of {self.width:g} m do not fit on the wheel; 2 to 1000 may")
         if self.xpic < 0:
             raise MpmError(f"xpic must be zero or more, not {self.xpic}")
         if self.width < 1.06 * self.dx:

@@ -12,7 +12,7 @@ import tyro
 from rich.console import Console
 from rich.progress import Progress
 
-from rftsim.cli.output import print_doubts, print_json, print_line, print_written
+from rftsim.cli.output import is_quiet, print_doubts, print_json, print_line, print_written
 from rftsim.cli.scene import Scene, print_robot, robot_report
 from rftsim.errors import RftsimError
 from rftsim.files import check_writable, replacing
@@ -70,7 +70,7 @@ class Drop(Scene):
         print_written(console, self.output)
 
     def _settle(self, staged: Staged) -> Settled:
-        with Progress(console=Console(stderr=True), transient=True, disable=self.json) as progress:
+        with Progress(console=Console(stderr=True), transient=True, disable=is_quiet(self.json)) as progress:
             task = progress.add_task(self.scene, total=self.limit)
 
             def observe(data: mujoco.MjData) -> None:

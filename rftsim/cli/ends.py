@@ -54,6 +54,16 @@ def parsed(parse: Callable[[], Any]) -> Any:
 
 
 @contextlib.contextmanager
+def unlogged() -> Iterator[None]:
+    """Let MuJoCo neither print warnings nor write MUJOCO_LOG.TXT: its data count them, and are read."""
+    mujoco.set_mju_user_warning(lambda text: None)
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(None)
+
+
+@contextlib.contextmanager
 def terminable() -> Iterator[None]:
     """Let SIGTERM end the block as an exception does, so that nothing half done is left; not in another thread."""
     if threading.current_thread() is not threading.main_thread():

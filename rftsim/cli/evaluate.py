@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.progress import Progress
 
 from rftsim.cli.extra import needing
-from rftsim.cli.output import make_table, print_json, print_written
+from rftsim.cli.output import is_quiet, make_table, print_json, print_written
 from rftsim.cli.results import draw
 from rftsim.errors import RftsimError
 from rftsim.files import check_writable
@@ -78,7 +78,7 @@ class Evaluate:
             if evaluate.settings_on(Folder(run).plan(), name) is None:
                 raise RftsimError(f"{name} has no density, which the law of {run} needs")
             jobs[f"{run} on {name}"] = (run, name, self.episodes, self.seed, self.threads, self.baseline)
-        with needing("ray"), Progress(console=Console(stderr=True), transient=True, disable=self.json) as bar:
+        with needing("ray"), Progress(console=Console(stderr=True), transient=True, disable=is_quiet(self.json)) as bar:
             task = bar.add_task("episodes", total=len(jobs))
             found = spread(evaluate.score, jobs, self.ray, lambda name, scores: bar.advance(task))
         scores = {

@@ -11,7 +11,7 @@ from rich.markup import escape
 from rftsim.cli.bench import Bench
 from rftsim.cli.demo import Demo
 from rftsim.cli.drop import Drop
-from rftsim.cli.ends import ERRORS, REFUSED, STOPPED, parsed, said, terminable
+from rftsim.cli.ends import ERRORS, REFUSED, STOPPED, parsed, said, terminable, unlogged
 from rftsim.cli.evaluate import Evaluate
 from rftsim.cli.fit import Fit
 from rftsim.cli.force import Force
@@ -43,7 +43,7 @@ Command = (
 def main(arguments: list[str] | None = None) -> None:
     """Run the command that the arguments name; exit with 2 where its input cannot be, and with 130 after Ctrl-C."""
     console = Console(stderr=True)
-    with terminable(), warnings.catch_warnings(record=True) as caught:
+    with terminable(), unlogged(), warnings.catch_warnings(record=True) as caught:
         for kind in (RftsimNote, RftsimWarning):
             warnings.simplefilter("always", kind)
         try:

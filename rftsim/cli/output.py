@@ -52,11 +52,18 @@ def make_table(title: str | None, words: Iterable[str], numbers: Iterable[str], 
     return table
 
 
+def is_quiet(hidden: bool) -> bool:
+    """Whether no bar is shown: it was asked for, or nobody looks, as standard error goes to a file."""
+    return hidden or not Console(stderr=True).is_terminal
+
+
 @contextmanager
 def progress(name: str, total: int, hidden: bool) -> Iterator[Callable[[str], None]]:
     """Show a bar of a command's steps; the function that it gives is called after each, with what comes, or was."""
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
     console = Console(stderr=True)
-    with Progress(*columns, TimeElapsedColumn(), TimeRemainingColumn(), console=console, disable=hidden) as bar:
+    with Progress(
+        *columns, TimeElapsedColumn(), TimeRemainingColumn(), console=console, disable=is_quiet(hidden)
+    ) as bar:
         task = bar.add_task(name, total=total)
         yield lambda said: bar.update(task, advance=1, description=said)

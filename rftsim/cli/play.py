@@ -72,6 +72,7 @@ class Play:
         who = self.actions or ("policy" if folder.exists else "random")
         if who == "policy" and not folder.exists:
             raise RftsimError(f"{self.run} is no folder of `rftsim train`: it has no policy")
+        maker = self._maker(who, folder)
         with contextlib.ExitStack() as stack:
             given = plan.settings | read_settings(self.set)
             env = SandEnv(plan.task, "rgb_array" if self.video else None, *SIZE, **given)
@@ -82,7 +83,6 @@ class Play:
                 for one in watchers:
                     one(info)
 
-            maker = self._maker(who, folder)
             found = list(play.play(env, maker, self.episodes, self.seed, seconds=self.seconds, watch=watch))
         paths = [path for path in (self.record, self.video, self.picture) if path]
         name = plan.as_json()["env"]

@@ -11,7 +11,7 @@ import mujoco
 from rich.console import Console
 from rich.progress import Progress
 
-from rftsim.cli.output import print_doubts, print_json, print_written
+from rftsim.cli.output import is_quiet, print_doubts, print_json, print_written
 from rftsim.cli.results import draw
 from rftsim.cli.scene import Scene, print_robot, robot_report
 from rftsim.files import check_writable
@@ -104,7 +104,7 @@ class Run(Scene):
 
     def _simulate(self, staged: Staged) -> Finished:
         samples = min(SAMPLES, math.ceil(staged.duration / staged.model.opt.timestep))
-        with Progress(console=Console(stderr=True), transient=True, disable=self.json) as progress:
+        with Progress(console=Console(stderr=True), transient=True, disable=is_quiet(self.json)) as progress:
             task = progress.add_task(self.scene, total=samples)
             with contextlib.ExitStack() as stack:
                 recorder = None

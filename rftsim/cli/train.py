@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from rftsim.cli.extra import needing
-from rftsim.cli.output import print_json, print_line
+from rftsim.cli.output import is_quiet, print_json, print_line
 from rftsim.cli.settings import Settings, read_settings
 from rftsim.errors import RftsimError
 
@@ -112,7 +112,7 @@ class Train:
             raise RftsimError("runs on Ray have one thread each and do not write for TensorBoard")
         from rftsim_envs.training.campaign import train_all
 
-        with needing("ray"), Progress(console=Console(stderr=True), disable=self.json) as bar:
+        with needing("ray"), Progress(console=Console(stderr=True), disable=is_quiet(self.json)) as bar:
             task = bar.add_task("runs", total=len(plans))
             return train_all(plans, self.out, address, lambda name, trained: bar.advance(task))
 
@@ -145,14 +145,14 @@ def _said(steps: int, began: int, done: bool, out: Path) -> str:
 @contextlib.contextmanager
 def interruptible() -> Iterator[Callable[[], bool]]:
     """Make the first Ctrl-C, or SIGTERM, a question that the block answers; a second one ends it, as ever."""
-    asked = False
+    asked, numbers = False, (signal.SIGINT, signal.SIGTERM)
 
     def ask(number: int, frame: object) -> None:
         nonlocal asked
         asked = True
-        signal.signal(number, before[number])
+        signal.signal(number, before[signal.Signals(number)])
 
-    before = {number: signal.signal(number, ask) for number in (signal.SIGINT, signal.SIGTERM)}
+    before = {number: signal.signal(number, ask) for number in numbers}
     try:
         yield lambda: asked
     finally:
@@ -171,7 +171,7 @@ def showing(name: str, steps: int, silent: bool) -> Iterator[Callable[[Mapping[s
         TimeElapsedColumn(),
         TimeRemainingColumn(elapsed_when_finished=True),
     )
-    with Progress(*columns, console=Console(stderr=True), disable=silent) as bar:
+    with Progress(*columns, console=Console(stderr=True), disable=is_quiet(silent)) as bar:
         task = bar.add_task(name, total=steps, score="-", pace="-")
 
         def report(row: Mapping[str, Any]) -> None:

@@ -51,8 +51,8 @@ def read_table(
     places = _places(path, sheet.headings, (*words, *numbers))
     for name in (*words, *needed):
         if name not in places:
-            there = ", ".join(heading.strip() for heading in sheet.headings) or "none"
-            raise RftsimError(f"{path} has no column {name!r}; it has {there}")
+            known = ", ".join(heading.strip() for heading in sheet.headings) or "none"
+            raise RftsimError(f"{path} has no column {name!r}; it has {known}")
     at: list[int] = []
     cells: dict[str, list[str]] = {name: [] for name in places}
     for line, row in sheet.rows:

@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Iterator
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -195,7 +195,7 @@ def predict(table: tuple[Term, ...], xi_n: float, mu_surf: float, plates: Plates
     return alpha
 
 
-def _spins(motion: Array) -> Iterator[tuple[Array, Array, Array, Array]]:
+def _spins(motion: Array) -> Iterator[tuple[Any, Array, Array, Array]]:
     """Rigid motions by which faces in the right places move in directions of their own, so that one call serves many.
 
     A spin about y moves the points of the plane z = -1 by (1, 0, -x), and one about z those with x = 0 by (-y, 0,

@@ -85,7 +85,7 @@ def _deaf_children() -> Iterator[None]:
 def measure_all(processes: int, report: Callable[[Point], None]) -> list[Point]:
     """Run every point of the demonstration, `processes` at a time; `report` is called with each as it ends."""
     context = multiprocessing.get_context("spawn")
-    jobs = points()
+    jobs, others = points(), set(multiprocessing.active_children())
     with concurrent.futures.ProcessPoolExecutor(processes, mp_context=context) as pool:
         with _deaf_children():
             futures = {pool.submit(measure, *job): job for job in jobs}
@@ -96,5 +96,7 @@ def measure_all(processes: int, report: Callable[[Point], None]) -> list[Point]:
                 report(done[futures[future]])
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
+            for process in set(multiprocessing.active_children()) - others:
+                process.terminate()
             raise
     return [done[job] for job in jobs]

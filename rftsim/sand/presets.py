@@ -99,7 +99,7 @@ def _pair(item: str) -> tuple[str, str]:
 
 
 def _read_sand(path: Path) -> dict[str, Any]:
-    text = read_toml(path, "sand")
+    text = read_toml(path, "sand", SandError)
     table = text.get("sand", text)
     if not isinstance(table, dict):
         raise SandError(f"the sand file {path} has sand = {table!r}; it needs a table [sand], or its parameters alone")

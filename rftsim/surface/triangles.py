@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rftsim.errors import SurfaceError
+from rftsim.files import check_size
 from rftsim.surface.shells import outer, wound
 from rftsim.surface.splitting import split
 from rftsim.surface.topology import Array as Array
@@ -18,6 +19,10 @@ EDGE_ON_DOUBLE: Final = 1e-9
 EDGE_ON_SINGLE: Final = 1e-6
 """Leading-edge tolerance on n.v_hat [-]: rounding of normals from MuJoCo's single precision."""
 
+LARGEST_FILE: Final = 64_000_000
+"""Size of a mesh's file that is still read [byte]: binary STL of a million triangles."""
+FARTHEST: Final = 1e6
+"""Largest coordinate of a mesh's file [m]."""
 LARGEST: Final = 20.0
 """Size of a body above which its mesh is suspected to be in other units [m]."""
 SMALLEST: Final = 1e-3
@@ -200,6 +205,7 @@ def load_surface(path: "str | Path", *, scale: float = 1.0, allow_open: bool = F
         allow_open: Whether a surface that is not closed is accepted.
 
     Raises:
+        RftsimError: The file is too large, or packed by gzip, bzip2 or xz.
         SurfaceError: The file is missing, is not a mesh, or does not bound a body.
     """
     path = Path(path)
@@ -207,6 +213,7 @@ def load_surface(path: "str | Path", *, scale: float = 1.0, allow_open: bool = F
         raise SurfaceError(f"no mesh file {path}")
     if not (np.isfinite(scale) and scale > 0.0):
         raise SurfaceError(f"the mesh scale must be positive, not {scale:g}")
+    check_size(path, LARGEST_FILE)
     import trimesh  # not at start-up, which it would slow by a second
 
     try:
@@ -215,7 +222,11 @@ def load_surface(path: "str | Path", *, scale: float = 1.0, allow_open: bool = F
         raise SurfaceError(f"cannot read the mesh {path}: {type(error).__name__}: {error}") from error
     if not isinstance(mesh, trimesh.Trimesh):
         raise SurfaceError(f"{path} holds no triangle mesh")
-    return make_surface(mesh.vertices * scale, mesh.faces, name=path.name, allow_open=allow_open)
+    vertices = mesh.vertices * scale
+    farthest = float(np.max(np.abs(vertices), initial=0.0, where=np.isfinite(vertices)))
+    if farthest > FARTHEST:
+        raise SurfaceError(f"{path.name} has a vertex {farthest:g} m from its origin; lengths are in metres")
+    return make_surface(vertices, mesh.faces, name=path.name, allow_open=allow_open)
 
 
 def _point(x: ArrayLike) -> str:

@@ -446,3 +446,34 @@ def test_throughput(capsys):
     with capsys.disabled():
         print({name: round(rate) for name, rate in rates.items()}, f"ratio {rates['batch'] / rates['single']:.2f}")
     assert rates["batch"] > 2.0 * rates["single"]
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        ("--seed", "99999999999999999999"),
+        ("--threads", "-3"),
+        ("--envs", "1000000000"),
+        ("--hyper", "log_std_init=1e308"),
+    ],
+)
+def test_a_refused_run_leaves_nothing(tmp_path, capsys, change):
+    code, out, err = call(capsys, "train", TASK, "--out", tmp_path / "run", *change)
+    assert (code, out) == (2, "")
+    assert len(err.splitlines()) == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (("--seed", -1), "seed zero or more"),
+        (("--seconds", "inf"), "seconds positive"),
+        (("--seconds", "nan"), "positive"),
+    ],
+)
+def test_episodes_that_cannot_be_played_are_refused(capsys, change, words):
+    code, out, err = call(capsys, "play", TASK, *change)
+    assert (code, out) == (2, "")
+    assert len(err.splitlines()) == 1
+    assert words in err

@@ -163,3 +163,33 @@ def test_folders_that_are_no_campaign(tmp_path):
     (tmp_path / "manifest.json").write_text(json.dumps({"plates": {"x": {"mu": 1}}}))
     with pytest.raises(MpmError, match="damaged"):
         status(tmp_path)
+
+
+@pytest.mark.parametrize("text", ["{}", '{"plates": {}}', "[]", "null", '{"plates": [1]}', "[" * 100_000])
+def test_a_manifest_without_jobs_is_refused(tmp_path, capsys, text):
+    """Nothing is not a campaign that is whole."""
+    (tmp_path / "manifest.json").write_text(text)
+    with pytest.raises(SystemExit) as end:
+        main(["campaign", "verify", str(tmp_path)])
+    out, err = capsys.readouterr()
+    assert (end.value.code, out) == (2, "")
+    assert len(err.splitlines()) == 1
+    assert "run the campaign's TOML file again" in err
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[[plates]]\nbeta = 1" + "0" * 400, "too large for a number"),
+        ("plates = [1]", "must have"),
+        ("[[plates]]\nbeta = " + "[" * 5000, "nested too deeply"),
+        (
+            "[[plates]]\n" + "".join(f"{n} = [{', '.join(['0.1'] * 400)}]\n" for n in ("beta", "gamma")),
+            "more than 100000",
+        ),
+    ],
+)
+def test_files_that_ask_for_too_much(tmp_path, text, said):
+    (tmp_path / "grid.toml").write_text(text)
+    with pytest.raises(MpmError, match=said):
+        read_jobs(tmp_path / "grid.toml")

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 import rerun.chunk as rerun_chunk
+import trimesh
 from rftsim_mpm.cli import main
 from rftsim_mpm.fields import free_surface
 
@@ -71,3 +72,29 @@ def test_free_surface_leaves_out_what_flies():
     place = np.array([[x, z] for x in (0.005, 0.015) for z in (0.0025, 0.0075, 0.0125)] + [[0.005, 0.2]])
     found = free_surface(place, np.full(len(place), 0.005), 0.01)
     np.testing.assert_allclose(found, [[0.005, 0.015], [0.015, 0.015]])
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "arguments", "words"),
+    [
+        ("nan.obj", "v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", (), "nan.obj"),
+        ("half.stl", "solid x\nfacet", (), "half.stl"),
+        ("empty.obj", "", (), "empty.obj"),
+        ("packed.stl", "\x1f\x8b", (), "unpack it first"),
+        ("cell.obj", None, ("--dx", "1e-5"), "particles: take larger cells"),
+        ("slow.obj", None, ("--speed", "1e-9"), "time steps"),
+        ("fast.obj", None, ("--speed", "100"), "go slower"),
+    ],
+)
+def test_solids_that_cannot_be_pushed(name, content, arguments, words, tmp_path, capsys):
+    path = tmp_path / name
+    if content is None:
+        trimesh.creation.box((0.05, 0.05, 0.05)).export(path)
+    else:
+        path.write_bytes(content.encode("latin-1"))
+    with pytest.raises(SystemExit) as end:
+        main(["push", "--shape", str(path), *arguments])
+    out, err = capsys.readouterr()
+    assert (end.value.code, out) == (2, "")
+    assert len(err.splitlines()) == 1
+    assert words in err

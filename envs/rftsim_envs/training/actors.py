@@ -24,6 +24,8 @@ Maker = Callable[[Episodes], Actor]
 def trained(folder: Folder) -> Maker:
     """A maker of actors by the policy of a run, without its noise; that of the checkpoint where it is not finished."""
     path = folder.policy if folder.policy.is_file() else folder.checkpoint
+    if not path.is_file():
+        raise TrainingError(f"{folder.path} has no policy yet: neither {folder.policy.name} nor {path.name} is there")
     training = folder.plan().training
 
     def make(episodes: Episodes) -> Actor:

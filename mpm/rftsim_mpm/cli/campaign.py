@@ -42,7 +42,11 @@ class Work:
             columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()
             console = Console(stderr=True)
             with Progress(
-                *columns, TextColumn("left"), TimeRemainingColumn(), console=console, disable=self.json
+                *columns,
+                TextColumn("left"),
+                TimeRemainingColumn(),
+                console=console,
+                disable=self.json or not console.is_terminal,
             ) as bar:
                 task = bar.add_task("jobs", total=left)
                 if self.ray is None:
