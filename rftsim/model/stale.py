@@ -39,7 +39,7 @@ def mark(model: mujoco.MjModel, body: int, packed: Array) -> None:
 
 
 def stale_doubts(model: mujoco.MjModel, surfaces: Iterable[tuple[int, Array]]) -> list[str]:
-    """The doubts about surfaces whose geoms are no longer what they were made from, and about another gravity, if any.
+    """The doubts about surfaces that were made from other geoms, and about stronger or weaker gravity, if any.
 
     Masses, joints and places of bodies may change: they are read from the model at each step.
 
@@ -55,7 +55,8 @@ def stale_doubts(model: mujoco.MjModel, surfaces: Iterable[tuple[int, Array]]) -
         found, size = _numbers(model, body)
         if abs(found - header.made_from) > CHANGED * size:
             changed.append(model.body(body).name)
-        gravity |= bool(np.abs(header.gravity - model.opt.gravity).max() > CHANGED * np.abs(header.gravity).max())
+        pull = np.linalg.norm(header.gravity)  # turned gravity is a slope
+        gravity |= bool(abs(pull - np.linalg.norm(model.opt.gravity)) > CHANGED * pull)
     doubts = []
     if changed:
         more = f" and {len(changed) - FEW} more" if len(changed) > FEW else ""
@@ -65,14 +66,14 @@ def stale_doubts(model: mujoco.MjModel, surfaces: Iterable[tuple[int, Array]]) -
         )
     if gravity:
         doubts.append(
-            "the gravity was changed after the sand was added, whose strength and level stay as they were: set "
+            "the strength of gravity was changed after the sand was added, whose own stays as it was: set "
             "instances(model)[k].bed.xi_n in proportion, or change it in the spec or file, and add the sand then"
         )
     return doubts
 
 
 def fingerprint(model: mujoco.MjModel) -> tuple[Any, ...]:
-    """What changes with every number that a bed, its surfaces or their doubts depend on; taken in microseconds."""
+    """Make what changes with every number that a bed, its surfaces or their doubts depend on, in microseconds."""
     geoms = (model.geom_type, model.geom_size, model.geom_pos, model.geom_quat, model.geom_contype)
     more = (model.geom_conaffinity, model.geom_dataid, model.body_plugin, model.opt.gravity)
     sums = float(model.mesh_vert.sum()), float(model.numeric_data.sum())

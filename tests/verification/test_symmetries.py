@@ -8,7 +8,9 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from shapes import ONE, about, alpha, blob, plate, rotation, unit
 
-from rftsim import FreeSurface, Sand, surface_force
+from rftsim import FreeSurface, RftsimError, Sand, surface_force
+from rftsim.law import evaluate, layout
+from rftsim.law.laws import get_law
 
 LAWS_3D = ("rft3d", "rft3d:c4")
 QUASI_STATIC = ("rft2d", *LAWS_3D)
@@ -203,6 +205,13 @@ def test_refining_flat_faces_converges_at_second_order(law):
 
 @pytest.mark.parametrize("law", QUASI_STATIC)
 def test_nan_stays_nan(law):
-    """A motion that is not a number gives a force that is not a number, instead of none."""
-    assert np.isnan(alpha((1, 0, -1), (np.nan, 0, -1), law)).any()
-    assert np.isnan(alpha((1, 0, -1), (1, 0, -1), law, position=(0, 0, np.nan))).any()
+    """A motion that is not a number gives a stress that is not a number, instead of none; a pose as input is refused."""
+    bed = layout.pack_bed(ONE, get_law(law), FreeSurface(), (0.0, 1.0, 0.0))
+    surface, still = layout.pack_surface(plate(unit((1, 0, -1)), centre=(0, 0, -1))), np.zeros(3)
+    for place, v in (((0, 0, 0), (np.nan, 0, -1)), ((0, 0, np.nan), (1, 0, -1))):
+        stress, _ = evaluate.triangle_stresses(
+            bed, surface, np.array(place, float), np.eye(3), np.array(v, float), still
+        )
+        assert np.isnan(stress).any()
+        with pytest.raises(RftsimError, match="must be finite"):
+            alpha((1, 0, -1), v, law, position=place)
