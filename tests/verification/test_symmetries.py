@@ -205,7 +205,7 @@ def test_refining_flat_faces_converges_at_second_order(law):
 
 @pytest.mark.parametrize("law", QUASI_STATIC)
 def test_nan_stays_nan(law):
-    """A motion that is not a number gives a stress that is not a number, instead of none; a pose as input is refused."""
+    """A motion that is not a number gives a stress that is not a number, instead of none; as input it is refused."""
     bed = layout.pack_bed(ONE, get_law(law), FreeSurface(), (0.0, 1.0, 0.0))
     surface, still = layout.pack_surface(plate(unit((1, 0, -1)), centre=(0, 0, -1))), np.zeros(3)
     for place, v in (((0, 0, 0), (np.nan, 0, -1)), ((0, 0, np.nan), (1, 0, -1))):
