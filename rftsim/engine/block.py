@@ -28,12 +28,12 @@ MORE_MARKER: Final = "rftsim-body-"
 SAND_MARKER: Final = "rftsim-sand:"
 BLOCK_HEAD: Final = np.dtype(
     [
-        *((name, "i8") for name in ("nbody", "bed", "state", "state_size", "has_complained")),
+        *((name, "i8") for name in ("nbody", "bed", "state", "state_size", "has_complained", "looking")),
         ("bed_weight", "f8"),
     ]
 )
 """Number of bodies; the bed's place in numeric_data; address and size of the state that lasts; whether it was said that
-the numbers were changed; the weight of the bed's sealed numbers, see `checks`."""
+the numbers were changed; the body whose surface is looked at; the weight of the bed's sealed numbers, see `checks`."""
 MEMBER: Final = np.dtype(
     [
         *((name, "i8") for name in ("body", "start", "size", "looked_at")),

@@ -239,6 +239,15 @@ def sensors_fit(model, m, instance):
 
 
 @loop
+def are_numbers(address, size):
+    """Whether so many numbers are finite."""
+    total, numbers = 0.0, doubles(address, size)
+    for i in range(size):
+        total += 0.0 * numbers[i]
+    return total == 0.0
+
+
+@loop
 def weigh(address, size):
     """The sum of so many numbers, each times a weight of its place, which what is moved or changed does not keep."""
     total, turn, whole, numbers = 0.0, 0.0, size // WEIGHED, doubles(address, size)

@@ -66,7 +66,7 @@ def _fill_member(model, m, address, body, owner, bed_name):
     member.body, member.start, member.size = body, start, size
     member.ntri, member.wheel_radius = header_at(at).ntri, header_at(at).wheel_radius
     member.header_weight, member.looked_at, member.weight_so_far = sound.weight(at, HEADER_NUMBERS), 0, 0.0
-    while not sound.look(at, member):
-        pass
+    while member.looked_at < member.size:
+        sound.look(at, member)
     member.weight = sound.looked(member)
     return True

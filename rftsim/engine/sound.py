@@ -3,14 +3,14 @@
 from numba import types
 
 from rftsim.engine import checks, instance
-from rftsim.engine.seal import BED_NUMBERS, LARGEST, TABLE
+from rftsim.engine.seal import BED_NUMBERS, TABLE
 from rftsim.law.body import header_at
 from rftsim.law.layout import HEADER_NUMBERS
 from rftsim.machine.compiling import exact, inline
 from rftsim.machine.memory import doubles, pointer, stack_doubles
 
-LOOK = 4096
-"""Numbers of a surface that are looked at in one step."""
+LOOK, PIECE = 4096, 512
+"""Numbers of all surfaces of a bed that are looked at in one step, about, and in one go."""
 _TABLE, _TABLE_END = TABLE.start, TABLE.stop
 _fill_weight = types.ExternalFunction("rftsim_weigh", types.void(types.intp, types.intp, types.intp))
 
@@ -19,25 +19,22 @@ _fill_weight = types.ExternalFunction("rftsim_weigh", types.void(types.intp, typ
 def is_sound(model, m, address, state_size):
     """Whether a block's bed, surfaces and state are still what was checked, or what may take its place.
 
-    The state has to be of the size that the force which is asked for wants. Of a surface of more than LOOK numbers, so
-    many are looked at each time, and their sum is compared at the end.
+    The state has to be of the size that the force which is asked for wants. Of surfaces of more than LOOK numbers, so
+    many are looked at each time, one surface after the other, and the sum of each is compared at its end.
     """
     end, kept = pointer(m + model.nnumericdata), instance.lasting(address)
     if kept.size != state_size:
         return False
-    for i in range(kept.size):
-        if not abs(kept[i]) <= LARGEST:
-            return False
-    if instance.head(address).bed > end - BED_NUMBERS:
+    if not checks.are_numbers(kept.ctypes.data, kept.size) or instance.head(address).bed > end - BED_NUMBERS:
         return False
     sand = instance.bed(model, m, address)
     if not checks.is_within(sand) or sealed_weight(sand) != instance.head(address).bed_weight:
         return False
     for k in range(instance.head(address).nbody):
         member = instance.member(address, k)
-        if member.start > end - member.size or not _is_same(instance.surface(model, m, address, k), member):
+        if member.start > end - member.size or not _has_header(instance.surface(model, m, address, k), member):
             return False
-    return True
+    return _look_on(model, m, address)
 
 
 @inline
@@ -55,23 +52,36 @@ def sealed_weight(sand):
 
 
 @exact
-def _is_same(at, member):
-    """Whether the surface at an address is still the one that was checked, as far as it is looked at now."""
+def _has_header(at, member):
+    """Whether the surface at an address still has the header that was checked."""
     header = header_at(at)
     if header.ntri != member.ntri or header.wheel_radius != member.wheel_radius:
         return False
-    return weight(at, HEADER_NUMBERS) == member.header_weight and (
-        not look(at, member) or looked(member) == member.weight
-    )
+    return weight(at, HEADER_NUMBERS) == member.header_weight
+
+
+@exact
+def _look_on(model, m, address):
+    """Weigh LOOK numbers more of the surfaces; whether those that are through are still what was checked."""
+    head, left, through = instance.head(address), LOOK, 0
+    while left > 0 and through < head.nbody:
+        member = instance.member(address, head.looking)
+        left -= look(instance.surface(model, m, address, head.looking), member)
+        if member.looked_at >= member.size:
+            through += 1
+            head.looking = head.looking + 1 if head.looking + 1 < head.nbody else 0
+            if looked(member) != member.weight:
+                return False
+    return True
 
 
 @exact
 def look(at, member):
-    """Weigh some more of a member's surface; whether all of it was looked at."""
-    n = min(LOOK, member.size - member.looked_at)
+    """Weigh one piece more of a member's surface, always the same ones; how many numbers that are."""
+    n = min(PIECE, member.size - member.looked_at)
     member.weight_so_far += weight(at + 8 * member.looked_at, n)
     member.looked_at += n
-    return member.looked_at >= member.size
+    return n
 
 
 @exact

@@ -5,14 +5,17 @@ What must last from step to step is a state, see `state`; the step's equation is
 
 from typing import Final
 
+import numpy as np
 from numba import types
 
 from rftsim.machine.compiling import exact
 from rftsim.machine.exports import address, entry
+from rftsim.machine.memory import doubles
 from rftsim.solver import equation, linear_algebra, sparse
 from rftsim.solver.equation import POINT
 from rftsim.solver.newton import V_C, solve
 from rftsim.solver.split_step import finish, parts_needed, remember, split_step
+from rftsim.solver.state import KEPT_NUMBERS
 from rftsim.solver.step_equation import answer_to, force_to, prepare, reset
 
 MOST_PARTS: Final = (24.0, 1.0)
@@ -45,15 +48,27 @@ def step(p):
         _take_back(p, slack, work)
     if not _is_finite(p):
         _let_go(p)
+    _keep_numbers(p)
 
 
 @exact
 def _is_finite(p):
     """Whether the force, and the velocity that it leads to, are numbers of a size that a step can have."""
-    q, after, found = equation.out(p), equation.after(p), True
+    q, after, lacking, found = equation.out(p), equation.after(p), equation.lacking(p), True
     for k in range(q.size):
-        found = found and abs(q[k]) < HUGE and abs(after[k]) < HUGE
+        found = found and abs(q[k]) < HUGE and abs(after[k]) < HUGE and abs(lacking[k]) < HUGE
     return found
+
+
+@exact
+def _keep_numbers(p):
+    """Clear what is kept of a body where it is no number: nothing is known of it then."""
+    for b in range(equation.head(p).nbody):
+        record = doubles(equation.kept_address(p, b), KEPT_NUMBERS)
+        for k in range(record.size):
+            if not abs(record[k]) < np.inf:
+                linear_algebra.clear(record)
+                break
 
 
 @exact
