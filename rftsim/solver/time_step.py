@@ -44,8 +44,8 @@ def step(p):
             break
         # a split step whose mean force does work: take it whole, from MuJoCo's own velocity
         _forget(p)
-    if work > slack:
-        _take_back(p, slack, work)
+    if work > slack and _is_finite(p):
+        _take_back(p, allowed, work)
     if not _is_finite(p):
         _let_go(p)
     _keep_numbers(p)
@@ -110,8 +110,8 @@ def _slack(p, allowed):
 
 
 @exact
-def _take_back(p, slack, work):
-    """Shrink a force that did work until it does none, and the wrenches with it."""
+def _take_back(p, allowed, work):
+    """Shrink a force that did work until it does no more than is allowed, and the wrenches with it."""
     h, q, answer = equation.numbers(p).timestep, equation.out(p), equation.end(p)
     wrench, changed = equation.all_wrenches(p), equation.momentum(p)
     # the force's own share of the work, and the rest's: where there are no constraints, they cancel at once
@@ -125,7 +125,7 @@ def _take_back(p, slack, work):
         for k in range(wrench.size):
             wrench[k] *= share
         answer_to(p, q, answer)
-        if _work(p, answer) <= slack:
+        if _work(p, answer) <= _slack(p, allowed):
             break
         share = 0.5 if trial < 4 else 0.0
     linear_algebra.copy(answer, equation.after(p))

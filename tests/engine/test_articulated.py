@@ -69,6 +69,17 @@ def test_sand_loses_no_scene(seed):
     assert np.isfinite(rftsim.wrenches(model, data).force).all()
 
 
+def test_a_solution_that_is_none_does_no_work():
+    """In this scene one step's solution comes to velocities without bound: its force is let go, and not only shrunk."""
+    scene = articulated(50)
+    model = scene.sandy(1e-2)
+    data, meter = scene.start(model), Meter()
+    for _ in range(60):
+        scene.move(data)
+        meter.advance(model, data)
+    assert meter.effort().gain < 1e-6
+
+
 def test_the_meter_counts_what_work_counts():
     """Step by step, the meter adds up to the totals; its sand has done work against the motion."""
     scene, meter = articulated(3), Meter()
