@@ -11,6 +11,7 @@ from rftsim.model.readout import Instance, Tractions, Work, Wrenches, instances,
 from rftsim.sand.free_surface import FreeSurface
 from rftsim.sand.medium import Sand
 from rftsim.sand.presets import PRESETS, make_sand
+from rftsim.sand.terrain import Terrain
 from rftsim.surface import shapes
 from rftsim.surface.triangles import Surface, Wheel, load_surface, make_surface
 
