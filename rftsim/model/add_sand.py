@@ -28,6 +28,7 @@ from rftsim.model.floors import (
     say_ground,
 )
 from rftsim.model.geometry import Geoms, Meshes
+from rftsim.model.marks import marks_for
 from rftsim.model.planar import check_planar
 from rftsim.model.readings import reading_doubts
 from rftsim.model.shaping import Fineness
@@ -48,6 +49,8 @@ from rftsim.reduction.reduce import Economy
 from rftsim.sand.free_surface import FreeSurface
 from rftsim.sand.medium import Sand
 from rftsim.sand.presets import make_sand
+from rftsim.sand.ruts import Ruts
+from rftsim.surface.prints import prints_of
 from rftsim.surface.triangles import Array, Surface, Wheel
 
 REDUCTION: Final = 0.01
@@ -89,6 +92,7 @@ def add_sand(
     bodies: "Iterable[str] | str | None" = None,
     terrain: "FreeSurface | float | None" = None,
     keep_floor: bool = False,
+    ruts: "Ruts | bool" = False,
     plane: ArrayLike = (0.0, 1.0, 0.0),
     geoms: Geoms = "collision",
     meshes: Meshes = "hull",
@@ -117,6 +121,9 @@ def add_sand(
             box, mesh or height field that the model stands on at its first keyframe, or z = 0 where there is none.
         keep_floor: Leave the floors at the sand's level as they are. By default they lose their collision, and their
             contact pairs, and are hidden.
+        ruts: Sand that remembers: where a body passes, the surface is lowered to what it swept, and what it displaced
+            piles up beside it and slides to the angle of repose, which needs the sand's `mu_int`. `True` takes cells
+            that fit the bodies, `Ruts` others.
         plane: Normal of the vertical plane of motion, for the 2D laws. Joints have to keep the bodies in it, as nothing
             would stop them across it.
         geoms: Which geoms bound a body: those that can collide, or `all`: where it has none of these, those it has.
@@ -155,7 +162,8 @@ def add_sand(
     draft = make_draft(spec)  # what is checked; the spec itself stays as it is until all is well
     _check_model(draft.model)
     site = _site(spec, draft, terrain)
-    numbers = layout.pack_bed(bed_sand, bed_law, site.terrain, plane, tolerance=tolerance, iterations=iterations)
+    options = {"tolerance": tolerance, "iterations": iterations}
+    numbers = layout.pack_bed(bed_sand, bed_law, site.terrain, plane, **options)
     choice = Choice(
         bodies=None if bodies is None else frozenset(_names(bodies)),
         fineness=Fineness(geoms, meshes, max_edge),
@@ -166,12 +174,16 @@ def add_sand(
     check_planar(draft.model, draft.data, felt.surfaces, bed_law, choice.plane)
     wheeled = rolling(draft.model, felt.surfaces, wheels if isinstance(wheels, Mapping) else _names(wheels))
     felt.surfaces.update(wheeled if bed_law.dynamic else {})
+    marks = marks_for(draft.data, draft.model, felt.surfaces) if ruts is True else ruts or None
+    whole = dict(felt.surfaces)
     economies = economise(draft.model, felt, numbers, reduction) if reduction else {}
     floors = find_floors(draft.model, draft.data, site.terrain, max(s.size for s in felt.surfaces.values()))
     check_sensors(spec, felt.surfaces if sensors else ())
     if draw:
         check_drawing(spec, name)
-    packed = _packed(draft.model, felt)
+    if marks is not None:
+        numbers = layout.pack_bed(bed_sand, bed_law, site.terrain, plane, **options, marks=marks)
+    packed = _packed(draft.model, felt, marks, whole)
     notes = [*_doubts(draft, bed_sand, numbers, packed, felt, floors), *(floor_doubts(floors) if keep_floor else ())]
 
     name_bodies(spec, draft)
@@ -217,9 +229,14 @@ def _integrate(spec: mujoco.MjSpec, force: str) -> list[str]:
     return ["the integrator is implicitfast now: RK4 would take the sand's force at the velocity of the moment"]
 
 
-def _packed(model: mujoco.MjModel, felt: Felt) -> dict[str, Array]:
-    """The surfaces as numbers, marked with what they were made from, by body name."""
-    packed = {name: layout.pack_surface(surface) for name, surface in felt.surfaces.items()}
+def _packed(model: mujoco.MjModel, felt: Felt, marks: Ruts | None, whole: Mapping[str, Surface]) -> dict[str, Array]:
+    """The surfaces as numbers, with prints of the whole ones, marked with what they were made from, by body name."""
+    packed = {
+        name: layout.pack_surface(
+            surface, None if marks is None else prints_of(whole[name], marks.spacing, layout.BLOCK)
+        )
+        for name, surface in felt.surfaces.items()
+    }
     for name, numbers in packed.items():
         mark(model, model.body(name).id, numbers)
     return packed

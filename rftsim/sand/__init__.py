@@ -3,4 +3,5 @@
 from rftsim.sand.free_surface import FreeSurface
 from rftsim.sand.medium import Sand
 from rftsim.sand.presets import PRESETS, make_sand
+from rftsim.sand.ruts import Ruts
 from rftsim.sand.terrain import Terrain
