@@ -34,8 +34,10 @@ class Scene:
     """Geoms that bound a body: those that can collide, or, where a body has none of these, all that it has."""
     meshes: Meshes | None = None
     """How meshes of model files are felt: hull, as MuJoCo collides with them, or exact, as they are where closed."""
-    surface: float | None = None
-    """Height of the sand's surface [m]; by default that of the floor, whose place it takes."""
+    terrain: str | None = None
+    """The sand's surface: a height [m]; slope=DEGREES[,heading=DEGREES]; dunes[,amplitude=M,wavelength=M,seed=N];
+    FILE.png,size=XxY,high=M[,low=M]; a .npy, .npz or .csv of heights with spacing=M; or the name of a height field geom
+    of the model. By default that of the floor, whose place it takes."""
     keyframe: str | None = None
     """Name or number of the keyframe in which a model file starts; by default the first."""
     keep_floor: bool = False
@@ -60,14 +62,13 @@ class Scene:
         options.setdefault("reduction", self.reduction)
         if self.bodies is not None:
             options["bodies"] = [name.strip() for name in self.bodies.split(",")]
-        if self.surface is not None:
-            options["terrain"] = self.surface
         return stage(
             self.scene,
             sand=self.sand,
             law=self.law,
             settings=read_settings(self.set),
             start=Start(self.keyframe, settle),
+            terrain=self.terrain,
             geoms=self.geoms,
             meshes=self.meshes,
             keep_floor=self.keep_floor,
