@@ -1,6 +1,7 @@
 """Options by which several commands take a scene: a shipped one, or somebody's model file, on sand."""
 
 import dataclasses
+import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -14,6 +15,8 @@ from rftsim.errors import RftsimError
 from rftsim.model.geometry import Geoms, Meshes
 from rftsim.run.robot import Robot
 from rftsim.run.scenes import SCENES, Staged, Start, stage
+from rftsim.sand.free_surface import FreeSurface
+from rftsim.sand.terrain import Terrain
 
 
 @dataclasses.dataclass(frozen=True)
@@ -76,6 +79,22 @@ class Scene:
             iterations=self.iterations,
             **options,
         )
+
+
+def surface_report(terrain: FreeSurface | Terrain) -> dict[str, Any]:
+    """The measures of the sand's surface, as JSON has them."""
+    if isinstance(terrain, FreeSurface):
+        return dataclasses.asdict(terrain)
+    return {
+        "rows": terrain.heights.shape[0],
+        "columns": terrain.heights.shape[1],
+        "spacing_m": terrain.spacing,
+        "origin_m": terrain.origin,
+        "repeat": terrain.repeat,
+        "lowest_m": float(terrain.heights.min()),
+        "highest_m": float(terrain.heights.max()),
+        "steepest_deg": math.degrees(terrain.steepest),
+    }
 
 
 def robot_report(robot: Robot) -> dict[str, Any]:

@@ -1,5 +1,6 @@
 """Heights from files: greyscale pictures, arrays, and tables of numbers."""
 
+import warnings
 from pathlib import Path
 from typing import Any, Final
 
@@ -12,6 +13,8 @@ from rftsim.sand.terrain import MOST, Array, Terrain
 
 PICTURES: Final = (".png",)
 ARRAYS: Final = (".npy", ".npz", ".csv")
+NAMES: Final = ("heights", "spacing", "origin", "repeat")
+"""Arrays that are taken from an `.npz`."""
 LARGEST: Final = 256_000_000
 """Largest file of numbers that is read [byte]."""
 UNREADABLE: Final = (OSError, ValueError, KeyError, EOFError, SyntaxError)
@@ -100,16 +103,24 @@ def _read_picture(path: Path) -> Array:
 def _read_numbers(path: Path, kind: str) -> dict[str, Any]:
     """The arrays of a file by name, at least its heights [m]."""
     check_size(path, LARGEST)
+    names: list[str] = []
     try:
         if kind == ".csv":
-            return {"heights": np.loadtxt(path, delimiter=",", ndmin=2, encoding="utf-8-sig")}
+            return {"heights": _read_table(path)}
         with open(path, "rb") as file:
             loaded = np.load(file, allow_pickle=False)
             if kind == ".npy":
                 return {"heights": np.asarray(loaded, dtype=float)}
-            arrays = {name: loaded[name] for name in ("heights", "spacing", "origin", "repeat") if name in loaded}
+            names = list(loaded)
+            arrays = {name: loaded[name] for name in NAMES if name in names}
             return arrays | {"heights": np.asarray(arrays["heights"], dtype=float)}
     except KeyError:
-        raise SandError(f"{path} has no array 'heights'; it has {', '.join(loaded) or 'none'}") from None
+        raise SandError(f"{path} has no array 'heights'; it has {', '.join(names) or 'none'}") from None
     except UNREADABLE as error:
         raise SandError(f"{path} cannot be read as numbers: {' '.join(str(error).split())}") from None
+
+
+def _read_table(path: Path) -> Array:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # of a table without a row, which is refused
+        return np.loadtxt(path, delimiter=",", ndmin=2, encoding="utf-8-sig")

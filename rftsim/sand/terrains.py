@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 
 from rftsim.errors import SandError
-from rftsim.sand.dunes import dunes
+from rftsim.sand.dune_field import dunes
 from rftsim.sand.free_surface import FreeSurface
 from rftsim.sand.heights import ARRAYS, PICTURES, load_terrain
 from rftsim.sand.terrain import Terrain
