@@ -13,7 +13,6 @@ from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import solve_banded
 
 from rftsim.sand.free_surface import FreeSurface, slope_normal
 
@@ -189,6 +188,8 @@ def _weights(t: Array, count: int, repeat: bool) -> tuple[Any, tuple[Array, ...]
 
 def _along(values: Array, repeat: bool) -> Array:
     """Padded coefficients, along the first axis, of the spline through values."""
+    from scipy.linalg import solve_banded  # not at start-up, where few need it
+
     n = len(values)
     if repeat:
         phase = 2.0 * np.pi * np.arange(n // 2 + 1) / n
