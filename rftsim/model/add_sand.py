@@ -18,7 +18,7 @@ from rftsim.model.economy import economise
 from rftsim.model.felt import Choice, Felt, felt_bodies
 from rftsim.model.floors import Floors, carrying, find_floors, floor_doubts, remove_floors, say_ground
 from rftsim.model.geometry import Geoms, Meshes
-from rftsim.model.planar import check_planar
+from rftsim.model.planar import check_planar, plane_of
 from rftsim.model.reach import slopes_of
 from rftsim.model.readings import reading_doubts
 from rftsim.model.shaping import Fineness
@@ -119,7 +119,8 @@ def add_sand(
         max_edge: Longest edge of a triangle [m]; by default a sixth of each geom's size.
         reduction: Model only what the scene needs: the fewest elements whose wrench is that of all triangles within
             this share (see `rftsim.reduction`), in the poses and motions that the joints allow, and none of bodies that
-            cannot reach the sand unless they are named in `bodies`. It holds for this sand, law and tree. Zero models
+            cannot reach the sand unless they are named in `bodies`. It holds for this sand, law and tree, and for each
+            slope that a terrain has. Zero models
             every triangle of every body, also for a model that is attached to another, or whose sand is tilted later.
         wheels: Driven wheels, behind which the dynamic laws let the free surface drop: names, whose axis is then that
             of their hinge and whose radius that of their surface; or `Wheel` by name.
@@ -153,7 +154,7 @@ def add_sand(
     choice = Choice(
         bodies=None if bodies is None else frozenset(_names(bodies)),
         fineness=Fineness(geoms, meshes, max_edge),
-        plane=layout.record(numbers, layout.BED).plane if bed_law.planar else None,
+        plane=plane_of(numbers, bed_law, site.terrain),
         terrain=site.terrain if reduction and bodies is None else None,
     )
     felt = felt_bodies(draft.model, draft.data, choice)

@@ -192,6 +192,20 @@ def test_a_body_is_seen_from_every_slope_that_a_terrain_has(across):
         np.testing.assert_allclose(up @ across, 0.0, atol=1e-12)
 
 
+CART = """<body name="cart" pos="0 0 .1"><joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/>
+<geom type="box" size=".1 .05 .05" mass="2"/></body>"""
+
+
+def test_planar_laws_take_what_is_the_same_all_across():
+    """Ripples across the way of a cart serve; dunes, which rise across its plane too, are refused, with a way out."""
+    ripples = Terrain.from_function(lambda x, y: 0.02 * np.sin(2.0 * x) + 0.0 * y, math.pi, 0.1, repeat=True)
+    assert loaded(spec_of(CART), law="rft2d", terrain=ripples)[0].terrain is ripples
+    with pytest.raises(
+        SceneError, match=r"rises by up to [\d.]+ degrees across it: take one .* all across, or .*rft3d"
+    ):
+        loaded(spec_of(CART), law="rft2d", terrain="dunes")
+
+
 # Standing -------------------------------------------------------------------------------------------------------------
 
 
