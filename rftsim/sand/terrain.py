@@ -93,6 +93,22 @@ class Terrain:
         heights = np.broadcast_to(heights, (len(y), len(x)))
         return cls(heights, fitted, (float(x[0]), float(y[0])), repeat)
 
+    @classmethod
+    def from_coefficients(
+        cls, coefficients: ArrayLike, spacing: tuple[float, float], origin: tuple[float, float], repeat: bool
+    ) -> "Terrain":
+        """The terrain that has these coefficients, to rounding; spacing, origin and repeat are those of the class.
+
+        Args:
+            coefficients: [m], shape (rows + 2 PAD, columns + 2 PAD).
+            spacing: Distance between values along x and along y [m].
+            origin: Place of the first value, x and y [m].
+            repeat: Whether it repeats.
+        """
+        padded = np.asarray(coefficients, dtype=float)
+        rows, columns = (n - 2 * PAD for n in padded.shape)
+        return cls(_finer(_finer(padded)[0][:rows].T)[0][:columns].T, spacing, origin, repeat)
+
     @functools.cached_property
     def coefficients(self) -> Array:
         """Coefficients of the B-splines [m], shape (rows + 2 PAD, columns + 2 PAD)."""

@@ -57,6 +57,14 @@ def test_the_steepest_slope_is_the_functions(repeat):
     assert made.height_at(*PLACES).max() <= made.ceiling.height <= 0.101
 
 
+@pytest.mark.parametrize("repeat", [False, True])
+def test_coefficients_give_the_terrain_back(repeat):
+    before = Terrain(RNG.normal(size=(5, 8)), (0.5, 0.25), (1.0, 2.0), repeat)
+    after = Terrain.from_coefficients(before.coefficients, before.spacing, before.origin, repeat)
+    np.testing.assert_allclose(after.heights, before.heights, atol=1e-14)
+    np.testing.assert_allclose(after.coefficients, before.coefficients, atol=1e-13)
+
+
 # Dunes ----------------------------------------------------------------------------------------------------------------
 
 
