@@ -206,7 +206,7 @@ def _doubts(
     """The doubts about surfaces, gravity and sensors, and those that show when the model stands in its sand."""
     model = draft.model
     packed = {model.body(name).id: numbers for name, numbers in surfaces.items()}
-    found = standing.stand(model, draft.data, standing.Bed(bed, packed, floors.terrain))
+    found = standing.stand(model, draft.data, standing.PackedBed(bed, packed, floors.terrain))
     return [
         *felt.doubts,
         *doubts.gravity_doubts(model, sand),

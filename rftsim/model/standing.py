@@ -104,14 +104,14 @@ def standing(model: mujoco.MjModel, data: mujoco.MjData) -> Standing:
     posed.qpos[:] = data.qpos
     for bed in instances(model):
         own = {body: surface for body, surface in bed.bodies.items() if body not in moved}
-        more = stand(model, posed, Bed(bed.packed, own, ground(model, data, bed.name)))
+        more = stand(model, posed, PackedBed(bed.packed, own, ground(model, data, bed.name)))
         posed.qpos[:] = more.qpos
         moved.update(int(body) for tree in more.trees for body in tree.bodies)
         found = Standing(more.qpos, found.trees + more.trees)
     return found
 
 
-class Bed(NamedTuple):
+class PackedBed(NamedTuple):
     """A bed of sand, which need not be in the model yet, and what feels it."""
 
     packed: Array
@@ -122,7 +122,7 @@ class Bed(NamedTuple):
     """The surface that bounds it from above."""
 
 
-def stand(model: mujoco.MjModel, data: mujoco.MjData, bed: Bed) -> Standing:
+def stand(model: mujoco.MjModel, data: mujoco.MjData, bed: PackedBed) -> Standing:
     """Find how deep a model stands in one bed of sand.
 
     Trees that touch, or that an equality joins, are moved as one.
@@ -207,7 +207,7 @@ def moving_weight(model: mujoco.MjModel) -> float:
     return float(own[model.body_weldid != 0].sum() * np.linalg.norm(model.opt.gravity))
 
 
-def _stand_tree(posed: mujoco.MjData, bed: Bed, tree: Tree) -> Tree:
+def _stand_tree(posed: mujoco.MjData, bed: PackedBed, tree: Tree) -> Tree:
     """The tree as it stands: lowered as far as its weight wants, with its feet."""
     lowered = _lowered(posed, bed, tree)
     if not np.isfinite(lowered):
@@ -222,7 +222,7 @@ def _stand_tree(posed: mujoco.MjData, bed: Bed, tree: Tree) -> Tree:
     return tree._replace(lowered=lowered, feet=tuple(sorted(feet, key=lambda foot: -foot.share)))
 
 
-def _lowered(posed: mujoco.MjData, bed: Bed, tree: Tree) -> float:
+def _lowered(posed: mujoco.MjData, bed: PackedBed, tree: Tree) -> float:
     """How far down the sand carries a tree's weight [m]; infinite where it does not at any depth."""
     points = np.concatenate([_outline(surface, posed.xpos[b], posed.xmat[b]) for b, surface in bed.surfaces.items()])
     touching = float((points[:, 2] - bed.ground.height_at(points[:, 0], points[:, 1])).min())
@@ -239,7 +239,7 @@ def _lowered(posed: mujoco.MjData, bed: Bed, tree: Tree) -> float:
     return float(np.interp(tree.weight, lifts[ends], [low, high]))
 
 
-def _lifts(posed: mujoco.MjData, bed: Bed, up: Array, lowered: Array) -> Array:
+def _lifts(posed: mujoco.MjData, bed: PackedBed, up: Array, lowered: Array) -> Array:
     """The sand's force along a normal on some bodies [N], lowered to depths [m] and pushed against it, both (n,)."""
     n, total = len(lowered), np.zeros(len(lowered))
     down, still = np.tile(-SLOW * up, (n, 1)), np.zeros((n, 3))

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from rftsim.errors import SandError
 from rftsim.files import check_size
-from rftsim.sand.terrain import MOST, Array, Terrain
+from rftsim.sand.terrain import MOST, Array, Terrain, lengths
 
 PICTURES: Final = (".png",)
 ARRAYS: Final = (".npy", ".npz", ".csv")
@@ -51,6 +51,23 @@ def load_terrain(
         ValueError: What it holds are no heights of a terrain.
     """
     path = Path(path)
+    found = _read(path, low, high)
+    heights = found["heights"]
+    if heights.ndim != 2 or min(heights.shape) < 2:
+        raise SandError(f"{path} must hold rows and columns of heights, not an array of shape {heights.shape}")
+    parts = np.array(heights.shape[::-1]) - 1
+    if (size is not None) + (spacing is not None) != 1 and not (size is None and "spacing" in found):
+        raise SandError(f"give the size of {path} [m], from its first value to its last, or the spacing of its values")
+    if size is not None or spacing is not None:
+        found["spacing"] = lengths(spacing, "spacing") if size is None else lengths(size, "size") / parts
+    if centre is not None or "origin" not in found:
+        x, y = (0.0, 0.0) if centre is None else centre
+        found["origin"] = np.array([x, y]) - lengths(found["spacing"], "spacing") * parts / 2
+    return Terrain(heights, found["spacing"], found["origin"], repeat or bool(found.get("repeat", False)))
+
+
+def _read(path: Path, low: float, high: float | None) -> dict[str, Any]:
+    """What a file tells of a terrain by the names of `Terrain`, at least its heights [m]; other arguments as above."""
     kind = path.suffix.lower()
     if kind not in PICTURES + ARRAYS:
         raise SandError(f"no terrain is read from {path}: it must end in {', '.join(PICTURES)} or {', '.join(ARRAYS)}")
@@ -58,26 +75,11 @@ def load_terrain(
         raise SandError(f"{path} holds heights in metres: low and high are those of black and white in a picture")
     if not path.is_file():
         raise SandError(f"no terrain file {path}")
-    found: dict[str, Any] = {}
-    if kind in PICTURES:
-        if high is None:
-            raise SandError(f"{path} is a picture: give high, the height of white [m], and low, that of black")
-        found["heights"] = low + (high - low) * _read_picture(path)
-    else:
-        found |= _read_numbers(path, kind)
-    heights = found["heights"]
-    if heights.ndim != 2 or min(heights.shape) < 2:
-        raise SandError(f"{path} must hold rows and columns of heights, not an array of shape {heights.shape}")
-    if (size is not None) + (spacing is not None) != 1 and not (size is None and "spacing" in found):
-        raise SandError(f"give the size of {path} [m], from its first value to its last, or the spacing of its values")
-    if size is not None:
-        found["spacing"] = np.broadcast_to(np.asarray(size, dtype=float), 2) / (np.array(heights.shape[::-1]) - 1)
-    elif spacing is not None:
-        found["spacing"] = spacing
-    if centre is not None or "origin" not in found:
-        extent = np.multiply(found["spacing"], np.array(heights.shape[::-1]) - 1)
-        found["origin"] = np.subtract((0.0, 0.0) if centre is None else centre, extent / 2)
-    return Terrain(heights, found["spacing"], found["origin"], repeat or bool(found.get("repeat", False)))
+    if kind not in PICTURES:
+        return _read_numbers(path, kind)
+    if high is None:
+        raise SandError(f"{path} is a picture: give high, the height of white [m], and low, that of black")
+    return {"heights": low + (high - low) * _read_picture(path)}
 
 
 def _read_picture(path: Path) -> Array:

@@ -54,7 +54,7 @@ class Terrain:
                 f"a terrain of {heights.shape[0]} x {heights.shape[1]} values is more than a model carries, {MOST}: "
                 "take a larger spacing"
             )
-        spacing = _lengths(self.spacing, "spacing")
+        spacing = lengths(self.spacing, "spacing")
         origin = np.asarray(self.origin, dtype=float)
         if origin.shape != (2,) or not np.isfinite(origin).all():
             raise ValueError(f"a terrain's origin must be the x and y of its first value, not {self.origin}")
@@ -237,7 +237,7 @@ def grid(size: ArrayLike, spacing: ArrayLike, repeat: bool) -> tuple[tuple[int, 
     Raises:
         ValueError: Size or spacing are no positive lengths, or the size holds no two values each way.
     """
-    extent, wanted = (_lengths(value, name) for value, name in ((size, "size"), (spacing, "spacing")))
+    extent, wanted = (lengths(value, name) for value, name in ((size, "size"), (spacing, "spacing")))
     parts = np.rint(extent / wanted)
     if parts.min() < (2 if repeat else 1):
         raise ValueError(f"a terrain's spacing must divide its size, {extent} m, into parts, which {wanted} m does not")
@@ -250,8 +250,12 @@ def grid(size: ArrayLike, spacing: ArrayLike, repeat: bool) -> tuple[tuple[int, 
     return (nx, ny), (dx, dy)
 
 
-def _lengths(value: ArrayLike, name: str) -> Array:
-    """Lengths along x and along y [m], of which one number may stand for both, shape (2,)."""
+def lengths(value: ArrayLike | None, name: str) -> Array:
+    """Lengths along x and along y [m], of which one number may stand for both, shape (2,).
+
+    Raises:
+        ValueError: They are no positive numbers, one or two.
+    """
     found = np.asarray(value, dtype=float)
     if found.shape not in ((), (1,), (2,)) or not np.isfinite(found).all() or not (found > 0.0).all():
         raise ValueError(f"a terrain's {name} must be positive, in metres, one number or two, not {found}")

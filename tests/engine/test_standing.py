@@ -9,7 +9,7 @@ from trees import spec_of, xml
 
 import rftsim
 from rftsim.law import layout
-from rftsim.model.standing import Bed, sinkage, stand, standing
+from rftsim.model.standing import PackedBed, sinkage, stand, standing
 
 XI_N = 2e5
 SAND = rftsim.Sand(xi_n=XI_N, rho_c=1500.0, mu_surf=0.4)
@@ -137,7 +137,7 @@ def test_before_the_sand_is_in_the_model():
     """`stand` takes packed sand and surfaces of a model without sand, and finds the same."""
     plain, model = mujoco.MjModel.from_xml_string(xml(box())), compiled(box())
     (bed,) = rftsim.instances(model)
-    found = stand(plain, mujoco.MjData(plain), Bed(bed.packed, bed.bodies, rftsim.FreeSurface()))
+    found = stand(plain, mujoco.MjData(plain), PackedBed(bed.packed, bed.bodies, rftsim.FreeSurface()))
     assert found.qpos == pytest.approx(stood(model).qpos, abs=1e-12)
 
 
