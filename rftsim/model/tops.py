@@ -1,5 +1,7 @@
 """Tops of static geoms: the faces, level or sloped, that a body could stand on, as heights over places."""
 
+import functools
+from collections.abc import Callable
 from typing import Final, NamedTuple
 
 import mujoco
@@ -37,18 +39,23 @@ def top_at(model: mujoco.MjModel, data: mujoco.MjData, geom: int, place: Array) 
         geom: The geom's id.
         place: World frame [m], of which x and y count, shape (3,).
     """
+    return _tops(model, data, geom)(place)
+
+
+def _tops(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> Callable[[Array], Top | None]:
+    """What gives the top of a geom over a place; arguments as of `top_at`."""
     kind = _GEOM(model.geom_type[geom])
     if kind not in FLAT:
-        return None
+        return lambda place: None
     rotation, origin = data.geom_xmat[geom].reshape(3, 3), data.geom_xpos[geom]
     if kind == _GEOM.mjGEOM_HFIELD:
-        return _field_top(model, geom, rotation, origin, place)
+        return functools.partial(_field_top, model, geom, rotation, origin)
     try:
         normals, offsets = _halfspaces(model, geom, kind)
     except SurfaceError:  # a flat mesh, which carries nothing in MuJoCo
-        return None
+        return lambda place: None
     normals, offsets = normals @ rotation.T, offsets + normals @ rotation.T @ origin
-    return _upper(normals, offsets, place)
+    return functools.partial(_upper, normals, offsets)
 
 
 def top_points(model: mujoco.MjModel, data: mujoco.MjData, geom: int, places: Array) -> Array:
@@ -61,7 +68,7 @@ def top_points(model: mujoco.MjModel, data: mujoco.MjData, geom: int, places: Ar
         places: World frame [m], of which x and y count, shape (n, 3).
     """
     if model.geom_type[geom] != int(_GEOM.mjGEOM_HFIELD):
-        tops = [top_at(model, data, geom, place) for place in places]
+        tops = map(_tops(model, data, geom), places)
         found = [[*place[:2], top.height] for place, top in zip(places, tops, strict=True) if top is not None]
         return np.array(found).reshape(-1, 3)
     field, rotation = int(model.geom_dataid[geom]), data.geom_xmat[geom].reshape(3, 3)

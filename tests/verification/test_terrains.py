@@ -251,7 +251,7 @@ def test_files_that_lack_something(tmp_path):
         ("other.npz", {"size": 1.0}, "has no array 'heights'; it has z"),
         ("hill.csv", {}, "give the size of"),
         ("hill.csv", {"size": 1.0, "spacing": 1.0}, "give the size of"),
-        ("hill.csv", {"size": -1.0}, "spacing must be positive"),
+        ("hill.csv", {"size": -1.0}, "size must be positive"),
         ("hill.txt", {"size": 1.0}, "it must end in .png or .npy, .npz, .csv"),
     ):
         with pytest.raises(ValueError, match=words):
