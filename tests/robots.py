@@ -52,8 +52,8 @@ def find_models() -> Iterator[Path]:
                 yield from sorted(Path(place).glob(pattern))
 
 
-def try_model(path: Path) -> dict[str, Any]:
-    """Load one model bare and on sand, let it settle, and move it."""
+def try_model(path: Path, **options: Any) -> dict[str, Any]:
+    """Load one model bare and on sand, with options of `rftsim.load`, let it settle, and move it."""
     row: dict[str, Any] = {"name": "/".join(path.parts[-2:]), "path": str(path)}
     try:
         bare = mujoco.MjModel.from_xml_path(str(path))
@@ -68,7 +68,7 @@ def try_model(path: Path) -> dict[str, Any]:
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
         try:
-            model = rftsim.load(path)
+            model = rftsim.load(path, **options)
         except rftsim.RftsimError as error:
             return row | {"error": str(error)[:200]}
     row["load_s"] = time.perf_counter() - started
