@@ -83,6 +83,6 @@ def total_force(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
 
 
 def against_gravity(model: mujoco.MjModel, force: Array) -> float:
-    """The part of a force that holds up a weight [N]; zero where there is no gravity."""
+    """The part of a force that holds up a weight [N]: against gravity, or along z where there is none."""
     strength = float(np.linalg.norm(model.opt.gravity))
-    return -float(force @ model.opt.gravity) / strength if strength > 0.0 else 0.0
+    return -float(force @ model.opt.gravity) / strength if strength > 0.0 else float(force[2])
