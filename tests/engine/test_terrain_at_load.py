@@ -90,6 +90,14 @@ def test_a_tilted_height_field_is_refused():
             add_sand(scene(place='euler="5 0 20"'), SAND, terrain=terrain)
 
 
+def test_a_height_field_that_moves_is_refused():
+    spec = scene(place='contype="0"')
+    spec.worldbody.add_body(name="cart").add_freejoint()
+    spec.body("cart").add_geom(name="load", type=mujoco.mjtGeom.mjGEOM_HFIELD, hfieldname="h", mass=1.0)
+    with pytest.raises(SceneError, match=r"geom load is a height field that moves with body cart: .*\(terrain=\)"):
+        add_sand(spec, SAND, terrain="load")
+
+
 def test_a_level_height_field_is_a_plane():
     """Which costs what a plane costs, at its height."""
     assert loaded(scene(heights=np.zeros((ROWS, COLUMNS))))[0].terrain == FreeSurface(0.5)
