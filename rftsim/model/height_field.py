@@ -32,8 +32,8 @@ def field_terrain(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> "Ter
     body = int(model.geom_bodyid[geom])
     if model.body_weldid[body] != 0 or model.body_mocapid[model.body_rootid[body]] >= 0:
         raise SceneError(
-            f"{shown(model.geom(geom).name)} is a height field that moves with body {model.body(body).name}: sand takes "
-            "the relief of one that stays where it is; or say where the sand lies (terrain=)"
+            f"{shown(model.geom(geom).name)} is a height field that moves with body {model.body(body).name}: sand "
+            "takes the relief of one that stays where it is; or say where the sand lies (terrain=)"
         )
     rotation, origin = data.geom_xmat[geom].reshape(3, 3), data.geom_xpos[geom]
     tilt = float(np.hypot(rotation[2, 0], rotation[2, 1]))
