@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from rftsim.law import evaluate, layout
 from rftsim.model.ground import ground
 from rftsim.model.readout import instances
-from rftsim.sand.free_surface import Ground
+from rftsim.sand.free_surface import GroundLike
 from rftsim.surface.triangles import Array
 
 _JOINT = mujoco.mjtJoint
@@ -118,7 +118,7 @@ class PackedBed(NamedTuple):
     """Packed sand."""
     surfaces: Mapping[int, Array]
     """Packed surface of each body that feels it, by body id."""
-    ground: Ground
+    ground: GroundLike
     """The surface that bounds it from above."""
 
 
@@ -158,7 +158,7 @@ def stand(model: mujoco.MjModel, data: mujoco.MjData, bed: PackedBed) -> Standin
     return Standing(qpos, tuple(trees))
 
 
-def _mean_normal(posed: mujoco.MjData, felt: Mapping[int, Array], ground: Ground) -> Array:
+def _mean_normal(posed: mujoco.MjData, felt: Mapping[int, Array], ground: GroundLike) -> Array:
     """The ground's normal in the mean over the rectangle around some bodies, seen from above, shape (3,)."""
     corners = np.concatenate([_outline(surface, posed.xpos[b], posed.xmat[b]) for b, surface in felt.items()])
     x, y = np.linspace(corners.min(axis=0), corners.max(axis=0), ACROSS).T[:2]
@@ -180,7 +180,7 @@ def _outline(surface: Array, xpos: Array, xmat: Array) -> Array:
     return np.concatenate([_box(surface, xpos, xmat), centres])
 
 
-def sinkage(ground: Ground, surface: Array, xpos: Array, xmat: Array) -> float:
+def sinkage(ground: GroundLike, surface: Array, xpos: Array, xmat: Array) -> float:
     """The depth of a body's lowest corner below the free surface [m], negative above it; within a triangle's size.
 
     A packed surface knows its triangles' centres and areas, and its box: the lowest corner is no lower than the box's,

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 
 
-class Ground(Protocol):
+class GroundLike(Protocol):
     """A free surface, of whatever kind, that is asked for heights, normals and depths."""
 
     def depth(self, points: ArrayLike) -> Any:
