@@ -21,7 +21,7 @@ sand_at = record_at(SAND)
 terrain_at = record_at(TERRAIN)
 """The head of the packed terrain at an address."""
 Head = namedtuple("Head", TERRAIN.names)  # type: ignore[misc, arg-type]
-Plane = namedtuple("Plane", ["up", "offset", "plane"])  # type: ignore[misc]
+Plane = namedtuple("Plane", ["up", "offset", "plane"])
 Level = namedtuple("Level", ["height", "along", "across", "plane"])
 Level.__doc__ = """The bed's plane: its height at the origin [m], its slopes along x and y [-], and the normal of the
 plane of motion of a planar law."""

@@ -153,7 +153,6 @@ def pack_bed(
     *,
     tolerance: float = TOLERANCE,
     iterations: int = ITERATIONS,
-    marks: Ruts | None = None,
 ) -> Array:
     """Sand under a law as numbers: a record of BED, and a packed terrain where its surface is no plane.
 
@@ -164,10 +163,9 @@ def pack_bed(
         plane: Normal of the plane of motion of a planar law.
         tolerance: Error of a body's velocity, relative, to which the implicit force is solved for.
         iterations: Most iterations of one such solution.
-        marks: The ruts that it remembers, if any.
 
     Raises:
-        SandError: The law, or sand that remembers, reads a parameter that is unknown of the sand, or is not one of LAWS
+        SandError: The law reads a parameter that is unknown of the sand, or is not one of LAWS
         nor made from one. ValueError: The plane's normal is not horizontal.
     """
     level = FreeSurface() if isinstance(terrain, Terrain) else terrain
@@ -183,23 +181,29 @@ def pack_bed(
         sand.density()
     if unknown:
         raise SandError(f"the law {law.name} needs the sand's {unknown[0]}: give it")
-    if marks is not None and sand.mu_int is None:
-        raise SandError(
-            "sand that remembers needs the sand's mu_int, whose angle is that at which its heaps stand: give it"
-        )
     numbers = np.zeros(numbers_in(BED))
     bed = record(numbers, BED)
     bed.response, bed.dynamic = RESPONSES.index(law.response), law.dynamic
     bed.up, bed.offset, bed.plane = up, level.offset, normal / length
     bed.tolerance, bed.iterations, bed.relief = tolerance, iterations, isinstance(terrain, Terrain)
-    if marks is not None:
-        bed.spacing, (bed.columns, bed.rows) = marks.spacing, marks.cells
     for name in PARAMETERS:
         value = getattr(sand, name)
         bed[name] = 0.0 if value is None else value  # MuJoCo reads no NaN from XML
     for row, column in zip(bed.table, tables.columns(law.table), strict=True):
         row[: len(column)] = column
     return np.concatenate([numbers, pack_terrain(terrain)]) if isinstance(terrain, Terrain) else numbers
+
+
+def remember(bed: Array, marks: Ruts) -> None:
+    """Have packed sand remember ruts.
+
+    Raises:
+        SandError: The sand's internal friction is unknown, whose angle is that at which heaps come to rest.
+    """
+    packed = record(bed, BED)
+    if packed.mu_int == 0.0:
+        raise SandError("sand that remembers needs the sand's mu_int, the tangent of the angle of its heaps: give it")
+    packed.spacing, (packed.columns, packed.rows) = marks.spacing, marks.cells
 
 
 def pack_terrain(terrain: Terrain) -> Array:

@@ -27,7 +27,7 @@ MIDDLE: Final = 0.5 * (BLOCK_SIDE - 1)
 
 ruts_at = record_at(RUTS)
 """The head of the ruts at an address."""
-_Cells = namedtuple("_Cells", ["spacing", "rows", "columns"])  # type: ignore[misc]
+_Cells = namedtuple("_Cells", ["spacing", "rows", "columns"])
 _cells_at = values_at(BED, _Cells)
 Marks = namedtuple("Marks", ["spacing", "rows", "columns", "row", "column", "cells", "blocks"])
 Marks.__doc__ = (
