@@ -15,6 +15,7 @@ from rftsim.law import layout
 from rftsim.law.laws import Law, get_law
 from rftsim.model import doubts
 from rftsim.model.draft import Draft, make_draft, name_bodies
+from rftsim.model.drawing import check_drawing, write_drawing
 from rftsim.model.economy import economise
 from rftsim.model.felt import Choice, Felt, felt_bodies
 from rftsim.model.floors import (
@@ -35,15 +36,7 @@ from rftsim.model.solution import check_solution
 from rftsim.model.stale import mark
 from rftsim.model.standing import stand
 from rftsim.model.wheels import rolling
-from rftsim.model.write import (
-    Carrier,
-    check_bed,
-    check_drawing,
-    check_sensors,
-    write_bed,
-    write_drawing,
-    write_sensors,
-)
+from rftsim.model.write import Carrier, check_bed, check_sensors, write_bed, write_sensors
 from rftsim.reduction.reduce import Economy
 from rftsim.sand.free_surface import FreeSurface
 from rftsim.sand.medium import Sand

@@ -10,8 +10,8 @@ from rftsim.engine import seal
 from rftsim.engine.block import BODY_MARKER, MORE_MARKER, SAND_MARKER, read_block
 from rftsim.errors import SceneError
 from rftsim.law import evaluate, layout
+from rftsim.model.drawing import DRAWING_MARKER
 from rftsim.model.stale import fingerprint, tell_stale
-from rftsim.model.write import DRAWING_MARKER
 from rftsim.surface.triangles import Array
 
 
