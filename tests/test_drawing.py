@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 
 import rftsim
+from rftsim.model.bounds import bounds, corners
 from rftsim.model.readout import sand_planes
 from rftsim.model.standing import standing
 from rftsim.view import drawing, look, render
-from rftsim.view.bounds import bounds, corners
 from rftsim.view.forces import resultants
 
 SCENE = """

@@ -172,7 +172,7 @@ def add_sand(
     write_bed(spec, carrier, numbers, packed)
     write_sensors(spec, carrier, felt.surfaces if sensors else ())
     if draw:
-        write_drawing(spec, name, site.terrain)
+        write_drawing(spec, name, site.terrain, draft)
     choices = [*felt.choices, *_integrate(spec, force)]
     if not keep_floor:
         choices = say_ground(site.ground, floors, remove_floors(spec, floors)) + choices

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from rftsim.errors import RftsimError
 from rftsim.surface.triangles import Array
+from rftsim.view.colours import traction_colours
 from rftsim.view.frames import Frame, Portrait
-from rftsim.view.shapes import geom_mesh, sand_shapes, snapped, traction_colours, triangle_mesh
+from rftsim.view.shapes import geom_mesh, sand_shapes, snapped, triangle_mesh
 
 OWN_PATHS: Final = ("world", "sand", "speed", "about")
 """First elements of the paths that the recorder itself writes."""

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from rftsim.model.bounds import bounds
 from rftsim.model.geometry import MESHES, bounding_geoms
 from rftsim.model.readout import Instance, body_velocities, instances, tractions, wrenches
 from rftsim.model.shaping import Fineness, body_surface
 from rftsim.model.standing import moving_weight
 from rftsim.surface.triangles import Array
-from rftsim.view.bounds import bounds
 from rftsim.view.forces import resultants
 
 
