@@ -34,7 +34,7 @@ Heights = Callable[[Array, Array], Any]
 
 
 class Level(NamedTuple):
-    """The size of a field."""
+    """The number of cells of a field, and their size."""
 
     cells: int
     """Cells along each side, a multiple of `UNIT`."""
@@ -43,7 +43,7 @@ class Level(NamedTuple):
 
     @property
     def width(self) -> float:
-        """Side of the field [m]."""
+        """The side of the field [m]."""
         return self.cells * self.cell
 
 
@@ -90,9 +90,9 @@ def make_levels(terrain: FreeSurface | Terrain, marks: Fineness | None, grain: f
 
 def period(terrain: FreeSurface | Terrain, marks: Fineness | None, wanted: float) -> float:
     """The period of the grain [m], about as long as is wanted: a power of two times what the finest field resolves."""
-    if marks is None and isinstance(terrain, FreeSurface):
-        return wanted
-    return _power(wanted, marks.spacing if marks else min(terrain.spacing), round)
+    if marks is not None:
+        return _power(wanted, marks.spacing, round)
+    return _power(wanted, min(terrain.spacing), round) if isinstance(terrain, Terrain) else wanted
 
 
 def _finest(marks: Fineness, grain: float) -> Level:

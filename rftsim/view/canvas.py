@@ -19,7 +19,7 @@ SKY: Final = 0.5
 
 
 class Shot(NamedTuple):
-    """What a camera sees."""
+    """The colours that a camera sees, and how far away they are."""
 
     colours: NDArray[np.uint8]
     """Shape (height, width, 3)."""

@@ -58,7 +58,7 @@ class _Fields:
         model.geom_sameframe[self._geoms] = int(mujoco.mjtSameFrame.mjSAMEFRAME_NONE)
 
     def follow(self, data: mujoco.MjData) -> list[int]:
-        surface = _surface(self._bed)
+        surface = surface_of(self._model, data, self._bed)
         focus = data.xpos[list(self._bed.bodies), :2].mean(axis=0)
         around = centres(self._levels, focus, self._grain)
         self._sampled = [
@@ -100,5 +100,6 @@ def _level(model: mujoco.MjModel, geom: int) -> Level:
     return Level(cells, 2.0 * float(model.hfield_size[one, 0]) / cells)
 
 
-def _surface(bed: Instance) -> Any:
+def surface_of(model: mujoco.MjModel, data: mujoco.MjData, bed: Instance) -> Any:
+    """The surface of a bed as it is in some data."""
     return FreeSurface(float(bed.bed.offset / bed.bed.up[2]), tuple(bed.bed.up.tolist()))

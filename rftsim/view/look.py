@@ -91,12 +91,14 @@ def _grain(side: int) -> "NDArray[np.uint8]":
 
     def noise(size: float) -> Array:
         smooth: Array = gaussian_filter(rng.standard_normal((side, side)), size, mode="wrap")
-        return smooth / smooth.std()
+        smooth /= smooth.std()
+        return smooth
 
-    brightness = 1.0 + sum(share * noise(size) for size, share in GRAINS)
+    brightness: Array = np.ones((side, side)) + sum(share * noise(size) for size, share in GRAINS)
     tint = 1.0 + noise(GRAINS[0][0])[..., None] * np.array(WARMTH)
     shades = np.array(SAND_RGB) * brightness[..., None] * tint
-    return (255.0 * np.clip(shades, 0.0, 1.0)).round().astype(np.uint8)
+    pixels: NDArray[np.uint8] = (255.0 * np.clip(shades, 0.0, 1.0)).round().astype(np.uint8)
+    return pixels
 
 
 def shine(scene: mujoco.MjvScene) -> None:
@@ -129,7 +131,8 @@ def veil(shot: Shot, sky: Any, clear: float) -> "NDArray[np.uint8]":
     haze[np.isinf(shot.distance)] = 0.0 if sky is not None else 1.0
     towards = 255.0 * np.array(BACKGROUND if sky is None else sky, dtype=np.float32)
     mixed = shot.colours + haze[..., None] * (towards - shot.colours)
-    return mixed.round().astype(np.uint8)
+    picture: NDArray[np.uint8] = mixed.round().astype(np.uint8)
+    return picture
 
 
 def horizon(model: mujoco.MjModel) -> Array | None:

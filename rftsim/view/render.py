@@ -1,6 +1,5 @@
 """Pictures of a model on sand: the scene as MuJoCo draws it, with haze, and the sand's forces before it."""
 
-import math
 import types
 from pathlib import Path
 from typing import Final, Self, TypeAlias
@@ -10,9 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 
-from rftsim.model.bounds import bounds, corners
-from rftsim.model.readout import instances
-from rftsim.surface.triangles import Array
+from rftsim.view.cameras import SIZE, Camera, as_free, framing
 from rftsim.view.canvas import SKY, Canvas, Shot
 from rftsim.view.drawing import FORCES, Drawing, Shown
 from rftsim.view.ground import Ground
@@ -20,23 +17,11 @@ from rftsim.view.look import CLEAR, WIDE, horizon, make_solid, painted, period, 
 
 Picture: TypeAlias = NDArray[np.uint8]
 """A picture, shape (height, width, 3)."""
-Camera: TypeAlias = int | str | mujoco.MjvCamera
-"""Id or name of a camera of the model, or a free camera."""
 _GEOM = mujoco.mjtGeom
-SIZE: Final = (960, 540)
-"""Width and height of a picture [pixels]."""
 BURIED: Final = 0.45
 """Share with which what is buried shows through the sand, where it is asked for."""
 ARROWS: Final = 0.85
 """Share with which arrows show through everything."""
-FILLED: Final = 0.8
-"""Share of the picture that the model takes, in height or in width."""
-AZIMUTH: Final = 118.0
-"""Direction in which a picture's camera looks, from the x axis on [degrees]."""
-ELEVATIONS: Final = (-16.0, -24.0, -32.0, -45.0, -60.0)
-"""Angles by which it may look up [degrees]; the first from which it is well above the sand."""
-ABOVE: Final = 0.4
-"""Height over the sand at which it is well above it, over the extent of what can move."""
 
 
 class Pictures:
@@ -97,7 +82,7 @@ class Pictures:
     def _update(self, data: mujoco.MjData, camera: Camera, option: mujoco.MjvOption) -> None:
         """Fill the scene with what there is of the model under some options."""
         scene, every = self._canvas.scene, int(mujoco.mjtCatBit.mjCAT_ALL)
-        perturb, eye = mujoco.MjvPerturb(), _free(self._model, camera)
+        perturb, eye = mujoco.MjvPerturb(), as_free(self._model, camera)
         mujoco.mjv_updateScene(self._model, data, option, perturb, eye, every, scene)
         for one in scene.camera:
             one.frustum_far = max(one.frustum_far, 4.0 * WIDE * self._drawing.extent / SKY)
@@ -146,47 +131,12 @@ def render(
         return pictures.take(data, camera)
 
 
-def framing(model: mujoco.MjModel, data: mujoco.MjData, aspect: float = SIZE[0] / SIZE[1]) -> mujoco.MjvCamera:
-    """Make a free camera that shows everything that can move, from the side and slightly from above.
-
-    Args:
-        model: Compiled.
-        data: Its data after mj_forward or mj_step.
-        aspect: Width over height of the picture.
-    """
-    camera = mujoco.MjvCamera()
-    camera.azimuth = AZIMUTH
-    camera.lookat[:], extent = bounds(model, data)
-    tangent = FILLED * np.tan(0.5 * np.radians(model.vis.global_.fovy))
-    arms = corners(model, data) - camera.lookat
-    for camera.elevation in ELEVATIONS:
-        ahead, right, up = _axes(camera)
-        wanted = np.maximum(np.abs(arms @ up) / tangent, np.abs(arms @ right) / (tangent * aspect)) - arms @ ahead
-        camera.distance = max(float(wanted.max(initial=0.0)), 0.5 * extent)
-        if _height(model, camera.lookat - camera.distance * ahead) > ABOVE * extent:
-            break
-    return camera
-
-
 def save_picture(pictures: Pictures, data: mujoco.MjData, path: Path) -> None:
     """Take a picture of everything that can move, as of the last step of its data, and write it to a file."""
     picture = pictures.take(data)
     import matplotlib.image
 
     matplotlib.image.imsave(path, picture)
-
-
-def _height(model: mujoco.MjModel, place: Array) -> float:
-    """Height of a place over the highest sand [m]; infinite where there is none."""
-    return min((float(one.bed.up @ place - one.bed.offset) for one in instances(model)), default=math.inf)
-
-
-def _axes(camera: mujoco.MjvCamera) -> tuple[Array, Array, Array]:
-    """Unit vectors ahead of a free camera, to its right and up, shape (3,) each."""
-    turn, lift = np.radians([camera.azimuth, camera.elevation])
-    ahead = np.array([np.cos(lift) * np.cos(turn), np.cos(lift) * np.sin(turn), np.sin(lift)])
-    right = np.array([np.sin(turn), -np.cos(turn), 0.0])
-    return ahead, right, np.cross(right, ahead)
 
 
 def _endless(model: mujoco.MjModel) -> "NDArray[np.bool_]":
@@ -220,12 +170,3 @@ def _shine_through(whole: Picture, bare: Shot, share: float) -> Picture:
     picture = whole.copy()
     picture[there] = mixed.round()
     return picture
-
-
-def _free(model: mujoco.MjModel, camera: Camera) -> mujoco.MjvCamera:
-    """A camera of the model by its id or name, or the free one that it is."""
-    if isinstance(camera, mujoco.MjvCamera):
-        return camera
-    fixed = mujoco.MjvCamera()
-    fixed.type, fixed.fixedcamid = mujoco.mjtCamera.mjCAMERA_FIXED, model.camera(camera).id
-    return fixed
