@@ -25,6 +25,8 @@ class Patches(NamedTuple):
     """Middle of the triangles, by area [m], shape (n, 3), world frame."""
     stress: Array
     """Mean traction [Pa], shape (n, 3), world frame."""
+    area: Array
+    """Area of the triangles [m^2], shape (n,)."""
 
 
 def patches(model: mujoco.MjModel, data: mujoco.MjData, extent: float) -> Patches:
@@ -46,7 +48,7 @@ def patches(model: mujoco.MjModel, data: mujoco.MjData, extent: float) -> Patche
     area = pressed[:, 11]
     total = np.bincount(keys, area)
     mean = np.array([np.bincount(keys, area * column) / total for column in pressed[:, :6].T]).reshape(6, -1)
-    return Patches(mean[:3].T, mean[3:].T)
+    return Patches(mean[:3].T, mean[3:].T, total)
 
 
 def _pressed(model: mujoco.MjModel, data: mujoco.MjData, body: int) -> Array:
