@@ -74,7 +74,7 @@ def test_tractions_end_on_the_triangles_that_they_press(rest, monkeypatch):
     assert sorted(nearest.argmin(axis=1)) == list(range(len(centres)))
     assert nearest.min(axis=1).max() < 1e-6
     longest, strongest = max(arrow.size[2] / 2 for arrow in arrows), np.linalg.norm(stresses, axis=1).max()
-    assert own.largest / 2.5 <= strongest <= own.largest
+    assert own.largest / 1.5 <= strongest <= own.largest
     assert longest == pytest.approx(drawing.TRACTION_LENGTH * own.extent * strongest / own.largest, rel=1e-5)
 
 
@@ -83,11 +83,11 @@ def test_few_arrows_carry_the_force_of_many_triangles(rest, monkeypatch):
     model, data = rest
     monkeypatch.setattr(tractions, "MOST", 20)
     found = tractions.patches(model, data, bounds(model, data)[1])
-    assert 5 < len(found.centre) <= 20
+    assert 5 < len(found.centre) <= 2 * 20
     centres, stresses, area = pressed(model, data)
     assert found.area @ found.stress == pytest.approx(area @ stresses, rel=1e-9)
     assert found.area @ found.centre == pytest.approx(area @ centres, rel=1e-9)
-    assert len(of_type(drawn(model, data, forces=False, tractions=True), mujoco.mjtGeom.mjGEOM_ARROW)) <= 20
+    assert len(of_type(drawn(model, data, forces=False, tractions=True), mujoco.mjtGeom.mjGEOM_ARROW)) <= 2 * 20
 
 
 def test_sides_of_a_thin_plate_have_arrows_of_their_own():
@@ -102,7 +102,7 @@ def test_sides_of_a_thin_plate_have_arrows_of_their_own():
     assert found.area.sum() == pytest.approx(area.sum())
 
 
-@pytest.mark.parametrize(("value", "rounded"), [(1.0, 1.0), (1.01, 2.0), (4.0, 5.0), (5100.0, 1e4), (0.02, 0.02)])
+@pytest.mark.parametrize(("value", "rounded"), [(1.0, 1.0), (1.01, 1.5), (4.1, 5.0), (8100.0, 1e4), (0.02, 0.02)])
 def test_scales_are_round(value, rounded):
     assert tractions.round_up(value) == pytest.approx(rounded)
 

@@ -61,8 +61,8 @@ class Drawing:
         model: The model.
         extent: The extent of what can move [m].
         weight: Its weight [N].
-        largest: Traction of the longest arrow and the darkest colour [Pa]: 1, 2 or 5 times a power of ten, and not
-            below the largest that was drawn so far, so that the arrows of a film have one scale.
+        largest: Traction of the longest arrow and the darkest colour [Pa]: a round number, not below the largest
+            that was drawn so far, so that the arrows of a film have one scale.
     """
 
     def __init__(self, model: mujoco.MjModel) -> None:

@@ -72,9 +72,12 @@ def painted(model: mujoco.MjModel) -> Iterator[None]:
 
 
 def dress(model: mujoco.MjModel, extent: float) -> None:
-    """Give a model's drawn sand its grain, and shadows that fit the extent of what can move [m], for good."""
+    """Give a model's drawn sand its grain, haze, and shadows that fit the extent of what can move [m], for good."""
     paint(model)
     model.vis.map.shadowclip = SHADED * extent / model.stat.extent
+    sky = horizon(model)
+    if sky is not None:
+        model.vis.rgba.haze[:3] = sky
 
 
 def _pixels(model: mujoco.MjModel, texture: int) -> "NDArray[np.uint8]":

@@ -164,8 +164,9 @@ def _nothing() -> mujoco.MjvOption:
 def _shine_through(whole: Picture, bare: Shot, share: float) -> Picture:
     """Mix a picture with a shot, of a share, where that shows something."""
     there = bare.colours.any(axis=2)
-    text = there & np.isinf(bare.distance)
-    there |= binary_dilation(text, np.ones((3, 3), bool))  # its black edge
+    solid, square = np.isfinite(bare.distance), np.ones((3, 3), bool)
+    text = there & ~binary_dilation(solid, square)
+    there |= binary_dilation(text, square) & ~solid  # the black edge of letters
     mixed = (1.0 - share) * whole[there] + share * bare.colours[there]
     picture = whole.copy()
     picture[there] = mixed.round()
