@@ -22,7 +22,7 @@ PERIOD: Final = 0.4
 """Side of the texture of grains, which repeats, over the extent of what can move."""
 PIXELS: Final = 512
 """Side of the texture [pixels]."""
-SHINE: Final = 0.12
+SHINE: Final = 0.2
 """Light that the drawn sand gives off itself."""
 THICK: Final = 0.3
 """Thickness of fields below their lowest vertex, over the extent of what can move."""
