@@ -27,10 +27,10 @@ def traction_colours(traction: NDArray[np.floating[Any]], scale: float) -> NDArr
 
 def packed(rgb: NDArray[Any]) -> NDArray[np.uint32]:
     """Colours 0xRRGGBBAA, opaque, of red, green and blue from 0 to 255, (..., 3)."""
-    whole = np.asarray(rgb).astype(np.uint32)
+    whole = np.rint(rgb).astype(np.uint32)
     found: NDArray[np.uint32] = (whole[..., 0] << 24) + (whole[..., 1] << 16) + (whole[..., 2] << 8) + np.uint32(255)
     return found
 
 
-_PALETTE: Final = packed(np.vstack([INACTIVE, (255.0 * shade(np.linspace(0.0, 1.0, 255))).round()]))
+_PALETTE: Final = packed(np.vstack([INACTIVE, 255.0 * shade(np.linspace(0.0, 1.0, 255))]))
 """The inactive colour, then 255 shades."""
