@@ -18,9 +18,9 @@ SAND_RGB: Final = (0.70, 0.61, 0.47)
 """Colour of the drawn sand, in the mean."""
 GRAIN_RGB: Final = (0.60, 0.51, 0.38)
 """Colour of the grains on it, where MuJoCo marks some."""
-PERIOD: Final = 0.4
+PERIOD: Final = 0.2
 """Side of the texture of grains, which repeats, over the extent of what can move."""
-PIXELS: Final = 512
+PIXELS: Final = 256
 """Side of the texture [pixels]."""
 SHINE: Final = 0.2
 """Light that the drawn sand gives off itself."""
@@ -38,8 +38,9 @@ def check_drawing(spec: mujoco.MjSpec, name: str) -> None:
     """
     lists = {"geom": spec.geoms, "height field": spec.hfields, "texture": spec.textures, "material": spec.materials}
     for kind, elements in lists.items():
-        if _drawing(name) in {element.name for element in elements}:
-            raise SceneError(f"the model has a {kind} {_drawing(name)!r} already: rename it, or pass draw=False")
+        taken = [one.name for one in elements if one.name.rstrip("0123456789") == _drawing(name)]
+        if taken:
+            raise SceneError(f"the model has a {kind} {taken[0]!r} already: rename it, or pass draw=False")
 
 
 def write_drawing(

@@ -5,6 +5,7 @@ from typing import Final, TypeAlias
 
 import mujoco
 import numpy as np
+from numpy.typing import ArrayLike
 
 from rftsim.model.bounds import bounds, corners
 from rftsim.model.readout import instances
@@ -27,19 +28,22 @@ LAG: Final = 0.15
 """Time by which a camera lags behind what it follows [s]."""
 
 
-def framing(model: mujoco.MjModel, data: mujoco.MjData, aspect: float = SIZE[0] / SIZE[1]) -> mujoco.MjvCamera:
+def framing(
+    model: mujoco.MjModel, data: mujoco.MjData, aspect: float = SIZE[0] / SIZE[1], more: ArrayLike = ()
+) -> mujoco.MjvCamera:
     """Make a free camera that shows everything that can move, from the side and slightly from above.
 
     Args:
         model: Compiled.
         data: Its data after mj_forward or mj_step.
         aspect: Width over height of the picture.
+        more: Further points that it shows [m], shape (n, 3).
     """
     camera = mujoco.MjvCamera()
     camera.azimuth = AZIMUTH
     camera.lookat[:], extent = bounds(model, data)
     tangent = FILLED * np.tan(0.5 * np.radians(model.vis.global_.fovy))
-    arms = corners(model, data) - camera.lookat
+    arms = np.concatenate([corners(model, data), np.reshape(more, (-1, 3))]) - camera.lookat
     for camera.elevation in ELEVATIONS:
         ahead, right, up = _axes(camera)
         wanted = np.maximum(np.abs(arms @ up) / tangent, np.abs(arms @ right) / (tangent * aspect)) - arms @ ahead

@@ -16,9 +16,9 @@ from rftsim.view.tractions import patches, round_up, said
 _GEOM = mujoco.mjtGeom
 FORCE_RGBA: Final = (0.16, 0.47, 1.0, 1.0)
 """Colour of the arrows of the sand's force on a body."""
-WEIGHT_LENGTH: Final = 0.8
+WEIGHT_LENGTH: Final = 0.5
 """Length of the arrow of a force as large as the weight, over the extent of what can move."""
-LONGEST: Final = 1.0
+LONGEST: Final = 0.7
 """Length of the longest arrow that is drawn, over the same."""
 TRACTION_LENGTH: Final = 0.2
 """Length of the arrow of the largest traction of the scale, over the same."""
@@ -28,6 +28,8 @@ FORCE_WIDTH: Final = 0.011
 """Half the width of a force's arrow, over the extent of what can move."""
 TRACTION_WIDTH: Final = 0.006
 """Half the width of a traction's arrow, over the extent of what can move."""
+GLOW: Final = 0.4
+"""Light that arrows give off themselves, whatever the model's lights."""
 SWATCH: Final = (26, 14)
 """Width and height of a colour in the legend [pixels]."""
 MARGIN: Final = 14
@@ -49,6 +51,17 @@ FORCES: Final = Shown()
 """The forces, on sand that hides what is buried."""
 ALL: Final = Shown(True, True, True)
 """Everything that the sand does, and hides."""
+
+
+class Arrow(NamedTuple):
+    """An arrow for a force."""
+
+    tail: Array
+    """Where it starts [m], shape (3,)."""
+    tip: Array
+    """Where it ends [m], shape (3,)."""
+    strength: float
+    """The force [N]."""
 
 
 class Drawing:
@@ -83,16 +96,20 @@ class Drawing:
         if shown.tractions:
             self._draw_tractions(scene, data)
 
+    def forces(self, data: mujoco.MjData) -> list[Arrow]:
+        """The arrows of the sand's force on each body, as of the last mj_forward or mj_step of the data."""
+        found = [(one, float(np.linalg.norm(one.force))) for one in resultants(self.model, data)]
+        scale = self.weight or 2.0 * max((strength for _, strength in found), default=0.0)
+        arrows = []
+        for one, strength in found:
+            if strength > FAINTEST * scale:
+                length = self.extent * min(WEIGHT_LENGTH * strength / scale, LONGEST)
+                arrows.append(Arrow(one.start, one.start + length / strength * one.force, strength))
+        return arrows
+
     def _draw_forces(self, scene: mujoco.MjvScene, data: mujoco.MjData) -> None:
-        found = resultants(self.model, data)
-        scale = self.weight or 2.0 * max((float(np.linalg.norm(one.force)) for one in found), default=0.0)
-        for one in found:
-            strength = float(np.linalg.norm(one.force))
-            if strength <= FAINTEST * scale:
-                continue
-            length = self.extent * min(WEIGHT_LENGTH * strength / scale, LONGEST)
-            tip = one.start + length / strength * one.force
-            _add_arrow(scene, one.start, tip, FORCE_WIDTH * self.extent, FORCE_RGBA)
+        for tail, tip, strength in self.forces(data):
+            _add_arrow(scene, tail, tip, FORCE_WIDTH * self.extent, FORCE_RGBA)
             _add_label(scene, tip, f"{strength:.3g} N")
 
     def _draw_tractions(self, scene: mujoco.MjvScene, data: mujoco.MjData) -> None:
@@ -147,6 +164,6 @@ def _new_geom(
         return None
     geom = scene.geoms[scene.ngeom]
     mujoco.mjv_initGeom(geom, kind, np.zeros(3), place, np.eye(3).ravel(), np.array(rgba, np.float32))
-    geom.category = mujoco.mjtCatBit.mjCAT_DECOR
+    geom.category, geom.emission = mujoco.mjtCatBit.mjCAT_DECOR, GLOW
     scene.ngeom += 1
     return geom

@@ -22,15 +22,17 @@ CLEAR: Final = 30.0
 """Distance from which haze prevails, over the same."""
 BACKGROUND: Final = (0.87, 0.89, 0.91)
 """Colour of the sky where a model has none."""
-GRAINS: Final = ((0.6, 0.12), (1.6, 0.05))
+GRAINS: Final = ((0.6, 0.12), (1.6, 0.09))
 """Sizes [pixels] of what makes the grain, and how much each changes its brightness [-]."""
+PATCHES: Final = 5.0
+"""Size from which on the grain has none [pixels]: from afar it is even, so that it is not seen to repeat itself."""
 WARMTH: Final = (0.015, 0.0, -0.03)
 """How much grains differ in red, green and blue [-]."""
 SUN: Final = (0.75, 0.45, -0.62)
 """Direction of the light of the sun that models get that have no light with shadows."""
-SUNLIGHT: Final = (0.62, 0.59, 0.54)
+SUNLIGHT: Final = (0.80, 0.77, 0.71)
 """Its colour."""
-SHADE: Final = 0.55
+SHADE: Final = 0.6
 """Factor of all other light then."""
 
 
@@ -94,6 +96,7 @@ def _grain(side: int) -> "NDArray[np.uint8]":
 
     def noise(size: float) -> Array:
         smooth: Array = gaussian_filter(rng.standard_normal((side, side)), size, mode="wrap")
+        smooth -= gaussian_filter(smooth, PATCHES, mode="wrap")
         smooth /= smooth.std()
         return smooth
 

@@ -59,7 +59,8 @@ class Pictures:
             camera: A camera; by default one that shows everything that can move.
         """
         if camera is None:
-            camera = framing(self._model, data, self._aspect)
+            tips = [arrow.tip for arrow in self._drawing.forces(data)] if self._shown.forces else []
+            camera = framing(self._model, data, self._aspect, tips)
         self._canvas.upload(self._model, self._ground.follow(data))
         self._update(data, camera, mujoco.MjvOption())
         scene, extent = self._canvas.scene, self._drawing.extent
