@@ -54,7 +54,7 @@ ALL: Final = Shown(True, True, True)
 
 
 class Arrow(NamedTuple):
-    """An arrow for a force."""
+    """The ends of an arrow that stands for a force, and how large that is."""
 
     tail: Array
     """Where it starts [m], shape (3,)."""
