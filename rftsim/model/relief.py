@@ -19,6 +19,8 @@ OUTER: Final = 96
 """Cells along each side of a field that is not the finest."""
 MOST: Final = 256
 """Most cells along a side of the finest field."""
+ENDLESS: Final = 128
+"""Cells along a side of it where the terrain repeats and bodies leave no marks."""
 UNIT: Final = 32
 """Number that divides the cells along each side of a field: half of it is the largest ratio of neighbouring cells."""
 STEP: Final = 4
@@ -77,7 +79,8 @@ def make_levels(terrain: FreeSurface | Terrain, marks: Fineness | None, grain: f
     relief, whole = math.inf, 2.0 * REACH * extent
     if isinstance(terrain, Terrain):
         shape = np.array(terrain.heights.shape[::-1]) * terrain.spacing
-        own = Fineness(min(terrain.spacing), math.inf if terrain.repeat else float(shape.max()))
+        spacing = min(terrain.spacing)
+        own = Fineness(spacing, ENDLESS * spacing if terrain.repeat else float(shape.max()))
         relief, marks = _power(own.spacing, grain, math.floor), marks or own
     assert marks is not None, "a plane without marks needs no fields"
     found = [_finest(marks, grain)]
@@ -97,9 +100,9 @@ def period(terrain: FreeSurface | Terrain, marks: Fineness | None, wanted: float
 
 def _finest(marks: Fineness, grain: float) -> Level:
     cell = _power(marks.spacing, grain, math.floor)
-    while math.isfinite(marks.width) and marks.width > MOST * cell:
+    while marks.width > MOST * cell:
         cell *= 2.0
-    cells = UNIT * math.ceil(min(marks.width / cell, MOST) / UNIT)
+    cells = UNIT * math.ceil(marks.width / cell / UNIT - 1e-9)
     return Level(max(cells, OUTER), cell)
 
 

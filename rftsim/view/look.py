@@ -133,11 +133,13 @@ def veil(shot: Shot, sky: Any, clear: float) -> "NDArray[np.uint8]":
         sky: The sky's colour at the horizon, 0 to 1, or None of a model that has none.
         clear: Distance at which haze prevails [m].
     """
-    haze = 1.0 - np.exp(-np.square(np.minimum(shot.distance / clear, 10.0)))
-    haze[np.isinf(shot.distance)] = 0.0 if sky is not None else 1.0
+    far = shot.distance > 0.04 * clear  # nearer, it changes no colour by a step
+    if sky is not None:
+        far &= np.isfinite(shot.distance)
+    haze = 1.0 - np.exp(-np.square(np.minimum(shot.distance[far] / clear, 10.0)))
     towards = 255.0 * np.array(BACKGROUND if sky is None else sky, dtype=np.float32)
-    mixed = shot.colours + haze[..., None] * (towards - shot.colours)
-    picture: NDArray[np.uint8] = mixed.round().astype(np.uint8)
+    picture: NDArray[np.uint8] = shot.colours.copy()
+    picture[far] = (picture[far] + haze[:, None] * (towards - picture[far])).round()
     return picture
 
 
