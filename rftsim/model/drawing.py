@@ -16,7 +16,7 @@ from rftsim.sand.terrain import Terrain
 
 SAND_RGB: Final = (0.70, 0.61, 0.47)
 """Colour of the drawn sand, in the mean."""
-GRAIN_RGB: Final = (0.60, 0.51, 0.38)
+GRAIN_RGB: Final = (0.50, 0.42, 0.30)
 """Colour of the grains on it, where MuJoCo marks some."""
 PERIOD: Final = 0.2
 """Side of the texture of grains, which repeats, over the extent of what can move."""
