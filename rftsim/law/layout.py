@@ -165,8 +165,8 @@ def pack_bed(
         iterations: Most iterations of one such solution.
 
     Raises:
-        SandError: The law reads a parameter that is unknown of the sand, or is not one of LAWS
-        nor made from one. ValueError: The plane's normal is not horizontal.
+        SandError: The law reads a parameter that is unknown of the sand, or is not one of LAWS nor made from one.
+        ValueError: The plane's normal is not horizontal.
     """
     level = FreeSurface() if isinstance(terrain, Terrain) else terrain
     up = np.array(level.normal)

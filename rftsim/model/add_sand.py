@@ -14,6 +14,7 @@ from rftsim.law import layout
 from rftsim.law.laws import Law, get_law
 from rftsim.model import doubts, standing
 from rftsim.model.draft import Draft, make_draft, name_bodies
+from rftsim.model.drawing import check_drawing, write_drawing
 from rftsim.model.economy import economise
 from rftsim.model.felt import Choice, Felt, felt_bodies
 from rftsim.model.floors import Floors, carrying, find_floors, floor_doubts, remove_floors, say_ground
@@ -27,15 +28,7 @@ from rftsim.model.site import find_site
 from rftsim.model.solution import check_solution
 from rftsim.model.stale import mark
 from rftsim.model.wheels import rolling
-from rftsim.model.write import (
-    Carrier,
-    check_bed,
-    check_drawing,
-    check_sensors,
-    write_bed,
-    write_drawing,
-    write_sensors,
-)
+from rftsim.model.write import Carrier, check_bed, check_sensors, write_bed, write_sensors
 from rftsim.reduction.reduce import Economy
 from rftsim.sand.free_surface import FreeSurface
 from rftsim.sand.medium import Sand
@@ -185,7 +178,7 @@ def add_sand(
     write_bed(spec, carrier, numbers, packed)
     write_sensors(spec, carrier, felt.surfaces if sensors else ())
     if draw:
-        write_drawing(spec, name, site.terrain)
+        write_drawing(spec, name, site.terrain, draft)
     choices = [*felt.choices, *_integrate(spec, force)]
     if not keep_floor:
         choices = say_ground(site.field, floors, remove_floors(spec, floors)) + choices

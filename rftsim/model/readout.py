@@ -18,7 +18,6 @@ from rftsim.engine.block import (
 from rftsim.errors import SceneError
 from rftsim.law import evaluate, layout
 from rftsim.model.stale import fingerprint, tell_stale
-from rftsim.model.write import DRAWING_MARKER
 from rftsim.surface.triangles import Array
 
 
@@ -112,18 +111,6 @@ def _instance(model: mujoco.MjModel, by_name: dict[str, int], instance: int, bod
         if relief is None:
             raise SceneError(f"the model lacks the terrain of its bed {name!r}: make it anew with rftsim.add_sand")
     return Instance(instance, name, int(model.numeric_adr[by_name[marked]]), packed, bodies, relief)
-
-
-def sand_planes(model: mujoco.MjModel) -> list[int]:
-    """Ids of the geoms that draw the surfaces of a model's beds."""
-    names = {bed.name for bed in instances(model)}
-    return [geom for geom in range(model.ngeom) if _drawn_bed(model.geom(geom).name) in names]
-
-
-def _drawn_bed(geom: str) -> str | None:
-    """The name of the bed that a geom of this name draws, if any; what a model was attached under may stand around."""
-    before, marker, after = geom.rpartition(DRAWING_MARKER)
-    return before + after if marker else None
 
 
 def _marked(by_name: dict[str, int], marker: str, owner: str) -> str | None:

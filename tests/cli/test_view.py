@@ -44,7 +44,7 @@ class FakeHandle:
 
     def __init__(self, model, pictures):
         self.user_scn = mujoco.MjvScene(model, maxgeom=2000)
-        self.perturb, self.left, self.texts = mujoco.MjvPerturb(), pictures, None
+        self.perturb, self.left, self.texts, self.updated = mujoco.MjvPerturb(), pictures, None, []
 
     def is_running(self):
         self.left -= 1
@@ -55,6 +55,9 @@ class FakeHandle:
 
     def set_texts(self, texts):
         self.texts = texts
+
+    def update_hfield(self, hfieldid):
+        self.updated.append(hfieldid)
 
     def sync(self):
         pass
@@ -101,8 +104,9 @@ def test_keys(shown):
     shown.advance(0.04, still)
     assert bed.xi_n == pytest.approx(strength / live.FACTOR)
     assert shown.data.time == pytest.approx(0.04)
-    assert shown.shown == Shown(False, False)
-    assert plane.rgba[3] == 1.0
+    assert shown.shown == Shown(False, True)
+    assert "traction, 0 to" in shown.texts()[0]
+    assert plane.rgba[3] == live.OPACITIES[1] < 1.0
     shown.data.qpos[2] += 1.0
     shown.press(live.BACKSPACE)
     shown.advance(0.0, still)
