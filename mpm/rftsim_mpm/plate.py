@@ -236,7 +236,11 @@ def measure(plate: Plate, watch: Watch | None = None) -> PlateForce:
         plate: The plate, its motion and its sand.
         watch: Called after each step with the simulation and the share of the way that is done.
     """
-    way = course(plate)
+    return reading(plate, course(plate), watch)
+
+
+def reading(plate: Plate, way: Course, watch: Watch | None = None) -> PlateForce:
+    """Return the force on a plate on a way of its own, read as `measure` reads it."""
     found = way.run(watch)
     return PlateForce(
         force=found.force,
