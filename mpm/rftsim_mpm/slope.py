@@ -29,11 +29,16 @@ class Slope(Plate):
     slope: float = 20.0
     """Angle by which the surface falls along the motion: positive downhill, negative uphill [deg]."""
     mu_int: float = 0.5
+    """Internal friction of the sand, above the tangent of the slope [-]."""
     depth: float | None = 0.04
+    """Depth of the leading face's centre at which the force is read, along the surface's normal [m]."""
     softness: float = 0.01
+    """Strain of the sand under the bearing pressure of the reading's depth, rho g z N_q / E."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.psi:
+            raise MpmError(f"a slope falls along the plate's motion: psi must be zero, not {self.psi:g}")
         if not math.tan(math.radians(abs(self.slope))) < self.mu_int:
             raise MpmError(
                 f"sand of mu_int {self.mu_int:g} does not stand at {self.slope:g} degrees: the slope must be below "
@@ -58,7 +63,7 @@ class Slope(Plate):
         beta, gamma = self.beta - self.slope, self.gamma + self.slope
         if self.turned_back:
             beta, gamma = -beta, math.copysign(180.0, gamma) - gamma
-        beta -= 180.0 * round(beta / 180.0 - 1e-9)
+        beta += 0.0 - 180.0 * round(beta / 180.0 - 1e-9)  # never minus zero, nor minus 90
         return dataclasses.replace(self, beta=beta, gamma=gamma, slope=0.0)
 
     @property
@@ -70,7 +75,13 @@ class Slope(Plate):
 def course(job: Slope) -> Course:
     """Return the plate's way through the slope: always the same travel, and sand that sticks to floor and walls."""
     way = plate.course(job)
-    return dataclasses.replace(way, approach=job.buried * job.length, gravity=job.gravity, wall_friction=math.inf)
+    return dataclasses.replace(
+        way,
+        approach=job.buried * job.length,
+        mirrors=(False, *way.mirrors[1:]),
+        gravity=job.gravity,
+        wall_friction=math.inf,
+    )
 
 
 def measure(job: Slope, watch: Watch | None = None) -> PlateForce:
