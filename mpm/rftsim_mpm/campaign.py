@@ -51,7 +51,7 @@ class Status(NamedTuple):
 
 
 def read_jobs(path: Path) -> list[Job]:
-    """Return the jobs of a TOML file: each list in a table named as in KINDS, such as `[[plates]]`, is an axis of a grid.
+    """Return the jobs of a TOML file: each list in a table that is named as in KINDS, is an axis of a grid.
 
     Settings under `[defaults]` hold for all.
 
@@ -178,7 +178,7 @@ def _name(job: Job) -> str:
 
 
 def results(folder: Path) -> list[dict[str, Any]]:
-    """Return every finished result: `plate`, `push`, `wheel` or `slope`, and what the command of that name reports of it."""
+    """Return every finished result: `plate`, `push`, `wheel` or `slope`, and what was measured of it."""
     names = set(status(folder).finished)
     return [json.loads((folder / "results" / f"{name}.json").read_text()) for name in sorted(names)]
 

@@ -98,8 +98,10 @@ class Course:
         if not (self.approach + self.window) / self.speed <= MOST_STEPS * dt:
             raise MpmError(f"the way takes more than {MOST_STEPS:g} time steps of {dt:.3g} s: go faster, or less far")
         box = (*(n * dx for n in width), top)
-        outside = {"gravity": self.gravity, "wall_friction": self.wall_friction}
-        sim = Simulation(self.material, bed, dx, box, bodies=[body], dt=dt, xpic=self.xpic, **outside)
+        sim = Simulation(
+            self.material, bed, dx, box, bodies=[body], dt=dt, xpic=self.xpic, gravity=self.gravity,
+            wall_friction=self.wall_friction,
+        )  # fmt: skip
         sim.clear_bodies()
         return sim
 

@@ -47,6 +47,8 @@ CONVENTIONS: Final = {
     "surface's up, depth along normal, times cos θ": Convention(True, False, True),
 }
 """Conventions by name."""
+SHOWN: Final = ("surface's up, depth along normal", "gravity's up, vertical depth")
+"""Conventions that are shown direction by direction."""
 
 
 def jobs(request: Request) -> dict[str, Callable[[], Any]]:
@@ -61,13 +63,15 @@ def compare(results: Results) -> list[dict[str, Any]]:
     """
     found = {Slope(**one["slope"]): np.array(one["force"]) for one in results}
     whole = [job for job in found if job.slope != 0.0 and job.as_to_gravity in found]
-    return [_case(job, found) for job in sorted(whole, key=lambda job: (abs(job.slope), job.gamma, job.slope, job.beta))]
+    return [
+        _case(job, found) for job in sorted(whole, key=lambda job: (abs(job.slope), job.gamma, job.slope, job.beta))
+    ]
 
 
 def _case(job: Slope, found: dict[Slope, Array]) -> dict[str, Any]:
     theta, force, level = np.radians(job.slope), found[job], found[job.as_to_surface]
     turned = found[job.as_to_gravity] * ([-1.0, 1.0] if job.turned_back else [1.0, 1.0]) @ _turn(theta).T
-    ratios: dict[str, dict[str, float]] = {CONTINUUM: {}} | {law: {} for law in LAWS}
+    ratios: dict[str, dict[str, float]] = {law: {} for law in (CONTINUUM, *LAWS)}
     errors = {}
     for name, convention in CONVENTIONS.items():
         guess = (level if convention.leans else turned) * convention.factor(theta)
@@ -133,6 +137,14 @@ def direction(case: dict[str, Any]) -> str:
     return f"{way}, {'down' if slope > 0.0 else 'up'}hill"
 
 
+def grouped(cases: list[dict[str, Any]]) -> dict[tuple[float, str], list[dict[str, Any]]]:
+    """Return the cases by slope [deg] and direction."""
+    groups: dict[tuple[float, str], list[dict[str, Any]]] = {}
+    for case in cases:
+        groups.setdefault((abs(case["slope"]), direction(case)), []).append(case)
+    return groups
+
+
 def missed(cases: list[dict[str, Any]], law: str, name: str) -> float:
     """Root mean square of a convention's errors with a law, over the force on level ground [-]."""
     off = [case["ratios"][law][name] - case["continuum"] for case in cases]
@@ -142,21 +154,50 @@ def missed(cases: list[dict[str, Any]], law: str, name: str) -> float:
 def rows(measured: Measured) -> list[Row]:
     """The rows of the continuum's resistance by direction, and of what each convention misses."""
     cases = outcome(measured, "slopes") or []
+    if not cases:
+        return []
     table = []
-    for slope, name in sorted({(abs(case["slope"]), direction(case)) for case in cases}):
-        own = [case for case in cases if (abs(case["slope"]), direction(case)) == (slope, name)]
-        got, expected = (
-            float(np.mean(some)) for some in zip(*((_by(case, DEFAULT), case["continuum"]) for case in own), strict=True)
-        )
-        what = f"{slope:g}°, {name}: resistance over level ground, {DEFAULT}"
-        table.append(Row(what, got, f"our continuum, mean of {len(own)} plates", expected=expected))
-    for law, said in ({CONTINUUM: "our continuum's own forces on level ground"} | {law: law for law in LAWS}).items():
-        for name in CONVENTIONS if cases else ():
-            what = f"{name}: error of {said}, root mean square"
-            table.append(Row(what, 100 * missed(cases, law, name), f"our continuum, {len(cases)} plates", unit="%"))
+    for (slope, name), own in grouped(cases).items():
+        expected, source = float(np.mean([case["continuum"] for case in own])), f"our continuum, {len(own)} plates"
+        for convention in SHOWN:
+            got = float(np.mean([case["ratios"]["rft3d"][convention] for case in own]))
+            what = f"{slope:g}°, {name}: resistance over level ground, {convention}"
+            table.append(Row(what, got, source, expected=expected))
+    source = f"our continuum, {len(cases)} plates"
+    for law, said in {CONTINUUM: "the continuum's forces on level ground", **{law: law for law in LAWS}}.items():
+        for name in CONVENTIONS:
+            table.append(Row(f"{said}, {name}: RMS error", 100 * missed(cases, law, name), source, unit="%"))
     return table
 
 
-def _by(case: dict[str, Any], name: str) -> float:
-    found: float = case["ratios"]["rft3d"][name]
-    return found
+def draw(measured: Measured, figure: Any) -> None:
+    """Draw the resistance by direction for each slope, of continuum and conventions, and what each misses."""
+    cases = outcome(measured, "slopes") or []
+    slopes = sorted({abs(case["slope"]) for case in cases})
+    axes = figure.subplots(1, len(slopes) + 1)
+    for axis, slope in zip(axes, slopes, strict=False):
+        _draw_ratios(axis, {name: own for (angle, name), own in grouped(cases).items() if angle == slope})
+        axis.set_title(f"slope of {slope:g}°, rft3d")
+    places, laws = np.arange(len(CONVENTIONS)), (CONTINUUM, *LAWS)
+    for k, law in enumerate(laws if cases else ()):
+        label = "continuum's own forces on level ground" if law == CONTINUUM else law
+        axes[-1].barh(places + 0.27 * (k - 1), [missed(cases, law, name) for name in CONVENTIONS], 0.25, label=label)
+    axes[-1].set_yticks(places, [name.replace(", ", ",\n") for name in CONVENTIONS], fontsize=7)
+    axes[-1].invert_yaxis()
+    axes[-1].set_xlabel("RMS error of the resistance over level ground [-]")
+    axes[-1].legend(fontsize=7)
+
+
+def _draw_ratios(axis: Any, groups: dict[str, list[dict[str, Any]]]) -> None:
+    """Draw each plate's resistance over level ground, a row for each direction of motion."""
+    for row, own in enumerate(groups.values()):
+        for k, name in enumerate(SHOWN):
+            some = [case["ratios"]["rft3d"][name] for case in own]
+            label = name if row == 0 else None
+            axis.plot(some, [row - 0.15 * (k + 1)] * len(own), "x", color=f"C{k}", label=label)
+        label = "continuum" if row == 0 else None
+        axis.plot([case["continuum"] for case in own], [row] * len(own), "ko", fillstyle="none", label=label)
+    axis.set_yticks(range(len(groups)), list(groups), fontsize=7)
+    axis.set_xlabel("resistance over that on level ground [-]")
+    axis.axvline(1.0, color="0.6", lw=0.8)
+    axis.legend(fontsize=6)

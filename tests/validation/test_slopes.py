@@ -49,7 +49,9 @@ def test_conventions_differ_by_cosines():
     """Vertical depth is depth along the normal over cos(theta); gravity across the surface is cos(theta) of all."""
     theta = np.radians(20.0)
     by_kind = {(c.vertical, c.across): c.factor(theta) for c in CONVENTIONS.values()}
-    assert by_kind == pytest.approx({(False, False): 1.0, (True, False): 1 / np.cos(theta), (False, True): np.cos(theta)})
+    assert by_kind == pytest.approx(
+        {(False, False): 1.0, (True, False): 1 / np.cos(theta), (False, True): np.cos(theta)}
+    )
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,6 @@ import numpy as np
 
 from rftsim_mpm.cli.study import StudyCommand, with_last_frame
 from rftsim_mpm.fields import Frame
-from rftsim_mpm.follow import part
 from rftsim_mpm.plate import PlateForce
 from rftsim_mpm.simulation import Watch
 from rftsim_mpm.slope import Slope, measure
@@ -40,9 +39,10 @@ class SlopeCommand(StudyCommand[Slope, SlopeFound]):
         return self.study.quick
 
     def _run(self, study: Slope, watch: Watch) -> SlopeFound:
-        shoot, frames = with_last_frame(part(watch, 0, 2))
+        shoot, frames = with_last_frame(lambda sim, share: watch(sim, 0.5 * share))
         force = measure(study, shoot)
-        return SlopeFound(force, measure(study.as_to_surface, part(watch, 1, 2)), frames[0])
+        level = measure(study.as_to_surface, lambda sim, share: watch(sim, 0.5 + 0.5 * share))
+        return SlopeFound(force, level, frames[0])
 
     def _report(self, study: Slope, found: SlopeFound) -> dict[str, Any]:
         return {
