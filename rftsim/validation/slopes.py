@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Any, Final, NamedTuple
 
 import numpy as np
+from rftsim_mpm.body import plane_rotation
 from rftsim_mpm.shapes import box
 from rftsim_mpm.slope import Slope
 
@@ -15,7 +16,7 @@ from rftsim.law.rigid import surface_force
 from rftsim.sand.medium import Sand
 from rftsim.surface.triangles import Array, make_surface
 from rftsim.validation.shipped import Results, outcome, shipped
-from rftsim.validation.study import Measured, Request, Row
+from rftsim.validation.study import Measured, Request, Row, at_most, near
 
 LAWS: Final = ("rft3d", "rft2d")
 """Laws that the conventions are tried with."""
@@ -24,7 +25,7 @@ CONTINUUM: Final = "level"
 
 
 class Convention(NamedTuple):
-    """What a law takes for depth and for up on a slope."""
+    """A choice of what is depth and what is up on a slope."""
 
     leans: bool
     """Whether up is the surface's normal, not gravity's."""
@@ -39,16 +40,20 @@ class Convention(NamedTuple):
         return (1.0 / cos if self.vertical else 1.0) * (cos if self.across else 1.0)
 
 
+SURFACE_S: Final = "surface's up, depth along normal"
+"""Name of the convention that knows no slope."""
+GRAVITY_S: Final = "gravity's up, vertical depth"
+"""Name of its opposite."""
 CONVENTIONS: Final = {
-    "surface's up, depth along normal": Convention(True, False),
+    SURFACE_S: Convention(True, False),
     "surface's up, vertical depth": Convention(True, True),
     "gravity's up, depth along normal": Convention(False, False),
-    "gravity's up, vertical depth": Convention(False, True),
+    GRAVITY_S: Convention(False, True),
     "surface's up, depth along normal, times cos θ": Convention(True, False, True),
 }
 """Conventions by name."""
-SHOWN: Final = ("surface's up, depth along normal", "gravity's up, vertical depth")
-"""Conventions that are shown direction by direction."""
+SAID: Final = {CONTINUUM: "continuum's own forces on level ground", **{law: law for law in LAWS}}
+"""What the laws are called in tables."""
 
 
 def jobs(request: Request) -> dict[str, Callable[[], Any]]:
@@ -56,72 +61,64 @@ def jobs(request: Request) -> dict[str, Callable[[], Any]]:
     return shipped("slopes", compare)
 
 
-def compare(results: Results) -> list[dict[str, Any]]:
-    """Each plate on a slope: resistance over that on level ground, by continuum and by convention and law [-].
+def compare(results: Results) -> dict[str, list[dict[str, Any]]]:
+    """Resistance of each plate on a slope, over that on level ground [-]: `cases` by convention and law, and `finer`.
 
-    The error of the whole force, over its size on level ground, is there for the table of the continuum's own forces.
+    `cases` also have the error of the whole force, over its size on level ground, where the law is the continuum's own
+    forces there. `finer` are plates in cells smaller than the others', in the continuum alone.
     """
     found = {Slope(**one["slope"]): np.array(one["force"]) for one in results}
-    whole = [job for job in found if job.slope != 0.0 and job.as_to_gravity in found]
-    return [
-        _case(job, found) for job in sorted(whole, key=lambda job: (abs(job.slope), job.gamma, job.slope, job.beta))
-    ]
+    jobs = sorted((job for job in found if job.slope), key=lambda job: (abs(job.slope), job.gamma, job.slope, job.beta))
+    coarse = max(job.dx for job in found)
+    return {
+        "cases": [_known(job, found) | _guessed(job, found) for job in jobs if job.dx == coarse],
+        "finer": [_known(job, found) for job in jobs if job.dx < coarse],
+    }
 
 
-def _case(job: Slope, found: dict[Slope, Array]) -> dict[str, Any]:
+def _known(job: Slope, found: dict[Slope, Array]) -> dict[str, float]:
+    ratio = float((found[job] @ job.direction) / (found[job.as_to_surface] @ job.direction))
+    return {name: getattr(job, name) for name in ("slope", "beta", "gamma", "cells")} | {"continuum": ratio}
+
+
+def _guessed(job: Slope, found: dict[Slope, Array]) -> dict[str, Any]:
     theta, force, level = np.radians(job.slope), found[job], found[job.as_to_surface]
-    turned = found[job.as_to_gravity] * ([-1.0, 1.0] if job.turned_back else [1.0, 1.0]) @ _turn(theta).T
+    image = [-1.0, 1.0] if job.turned_back else [1.0, 1.0]
+    turned = found[job.as_to_gravity] * image @ plane_rotation(theta)
     ratios: dict[str, dict[str, float]] = {law: {} for law in (CONTINUUM, *LAWS)}
     errors = {}
     for name, convention in CONVENTIONS.items():
         guess = (level if convention.leans else turned) * convention.factor(theta)
         errors[name] = float(np.linalg.norm(guess - force) / np.linalg.norm(level))
         ratios[CONTINUUM][name] = float((guess @ job.direction) / (level @ job.direction))
-    for law in LAWS:
-        straight = resistance(job, law, leans=True)
-        for name, convention in CONVENTIONS.items():
-            own = resistance(job, law, leans=convention.leans) * convention.factor(theta)
-            ratios[law][name] = own / straight
-    return {
-        **{name: getattr(job, name) for name in ("slope", "beta", "gamma", "cells")},
-        "continuum": float((force @ job.direction) / (level @ job.direction)),
-        "ratios": ratios,
-        "errors": errors,
-        "force": (force / np.linalg.norm(level)).tolist(),
-        "level": (level / np.linalg.norm(level)).tolist(),
-    }
-
-
-def _turn(theta: float) -> Array:
-    """Rotation by which a row of the surface's axes x and z becomes one of gravity's, shape (2, 2)."""
-    c, s = np.cos(theta), np.sin(theta)
-    return np.array([[c, s], [-s, c]]).T
+        for law in LAWS:
+            own = convention.factor(theta) * resistance(job, law, leans=convention.leans)
+            ratios[law][name] = own / resistance(job, law, leans=True)
+    return {"ratios": ratios, "errors": errors}
 
 
 def resistance(job: Slope, law: str, *, leans: bool) -> float:
-    """Resistance of a law to a plate at depths along the normal, for either up, of unit strength [m^3].
+    """Resistance of a law of unit strength to a plate per metre of width, at depths along the normal [m^2].
 
     Args:
         job: The plate on its slope.
         law: The law's name.
-        leans: Whether up is the surface's normal.
+        leans: Whether up is the surface's normal, not gravity's.
     """
     shape = box(job.length, 1.0, job.thick)
     surface = make_surface(shape.vertices, shape.faces)
-    theta = 0.0 if leans else np.radians(job.slope)
-    to_up = _in_space(_turn(theta).T)
-    rotation, direction = _in_space(job.rotation), np.array([job.direction[0], 0.0, job.direction[1]])
-    middle = job.z + 0.5 * job.thick * job.leading[-1]
-    depth = middle - (surface.centres @ rotation.T)[:, 2]
+    turn = np.eye(3) if leans else _in_space(plane_rotation(np.radians(job.slope)))
+    rotation, motion = _in_space(job.rotation), np.array([job.direction[0], 0.0, job.direction[1]])
+    depth = job.z + 0.5 * job.thick * job.leading[-1] - (surface.centres @ rotation.T)[:, 2]
     sand = Sand(xi_n=1.0, zeta=1.0, mu_surf=job.mu_surf)
-    place = {"position": (0.0, 0.0, -1.0), "rotation": to_up @ rotation, "velocity": to_up @ direction}
+    place = {"position": (0.0, 0.0, -1.0), "rotation": turn @ rotation, "velocity": turn @ motion}
     state = surface_force(surface, sand, law, **place)
     force = (surface.areas * depth / state.depth) @ state.stress
-    return -float(force @ to_up @ direction)
+    return -float(force @ turn @ motion)
 
 
 def _in_space(plane: Array) -> Array:
-    """A rotation of x and z as one of space, shape (3, 3)."""
+    """Return a rotation of x and z as one of space, shape (3, 3)."""
     (a, b), (c, d) = plane
     return np.array([[a, 0.0, b], [0.0, 1.0, 0.0], [c, 0.0, d]])
 
@@ -146,42 +143,66 @@ def grouped(cases: list[dict[str, Any]]) -> dict[tuple[float, str], list[dict[st
 
 
 def missed(cases: list[dict[str, Any]], law: str, name: str) -> float:
-    """Root mean square of a convention's errors with a law, over the force on level ground [-]."""
+    """Root mean square of a convention's errors with a law, over the resistance on level ground [-]."""
     off = [case["ratios"][law][name] - case["continuum"] for case in cases]
     return float(np.sqrt(np.mean(np.square(off))))
 
 
 def rows(measured: Measured) -> list[Row]:
     """The rows of the continuum's resistance by direction, and of what each convention misses."""
-    cases = outcome(measured, "slopes") or []
-    if not cases:
+    found = outcome(measured, "slopes")
+    if not found:
         return []
+    cases = found["cases"]
+    return [*_direction_rows(cases), *_error_rows(cases), *_finer_rows(cases, found["finer"])]
+
+
+def _direction_rows(cases: list[dict[str, Any]]) -> list[Row]:
     table = []
     for (slope, name), own in grouped(cases).items():
-        expected, source = float(np.mean([case["continuum"] for case in own])), f"our continuum, {len(own)} plates"
-        for convention in SHOWN:
-            got = float(np.mean([case["ratios"]["rft3d"][convention] for case in own]))
-            what = f"{slope:g}°, {name}: resistance over level ground, {convention}"
-            table.append(Row(what, got, source, expected=expected))
-    source = f"our continuum, {len(cases)} plates"
-    for law, said in {CONTINUUM: "the continuum's forces on level ground", **{law: law for law in LAWS}}.items():
+        got = float(np.mean([case["continuum"] for case in own]))
+        other = np.mean([case["ratios"]["rft3d"][GRAVITY_S] for case in own])
+        what = f"continuum: {slope:g}°, {name}: resistance over level ground, mean of {len(own)} plates"
+        note = f"rft3d, {GRAVITY_S}: {other:.2f}"
+        table.append(Row(what, got, f"{SURFACE_S}, by definition", expected=1.0, note=note))
+    return table
+
+
+def _error_rows(cases: list[dict[str, Any]]) -> list[Row]:
+    table, source = [], f"our continuum, {len(cases)} plates"
+    for law, said in SAID.items():
         for name in CONVENTIONS:
-            table.append(Row(f"{said}, {name}: RMS error", 100 * missed(cases, law, name), source, unit="%"))
+            what = f"{said}; {name}: RMS error of the resistance over level ground"
+            table.append(Row(what, 100 * missed(cases, law, name), source, unit="%"))
+    for name in CONVENTIONS:
+        off = float(np.sqrt(np.mean([case["errors"][name] ** 2 for case in cases])))
+        table.append(Row(f"{SAID[CONTINUUM]}; {name}: of the whole force", 100 * off, source, unit="%"))
+    share = missed(cases, "rft3d", SURFACE_S) / missed(cases, "rft3d", GRAVITY_S)
+    table.append(at_most(f"rft3d: error, {SURFACE_S}, over that of {GRAVITY_S}", share, 1.0, source))
+    return table
+
+
+def _finer_rows(cases: list[dict[str, Any]], finer: list[dict[str, Any]]) -> list[Row]:
+    table = []
+    for one in finer:
+        (same,) = (case for case in cases if all(case[name] == one[name] for name in ("slope", "beta", "gamma")))
+        what = f"continuum: {abs(one['slope']):g}°, {direction(one)}, β {one['beta']:g}°, {one['cells']:g} cells"
+        expected = same["continuum"]
+        table.append(near(what, one["continuum"], expected, 0.1, f"the same, {same['cells']:g} cells"))
     return table
 
 
 def draw(measured: Measured, figure: Any) -> None:
     """Draw the resistance by direction for each slope, of continuum and conventions, and what each misses."""
-    cases = outcome(measured, "slopes") or []
+    cases = (outcome(measured, "slopes") or {"cases": []})["cases"]
     slopes = sorted({abs(case["slope"]) for case in cases})
-    axes = figure.subplots(1, len(slopes) + 1)
+    axes = np.atleast_1d(figure.subplots(1, len(slopes) + 1))
     for axis, slope in zip(axes, slopes, strict=False):
         _draw_ratios(axis, {name: own for (angle, name), own in grouped(cases).items() if angle == slope})
-        axis.set_title(f"slope of {slope:g}°, rft3d")
-    places, laws = np.arange(len(CONVENTIONS)), (CONTINUUM, *LAWS)
-    for k, law in enumerate(laws if cases else ()):
-        label = "continuum's own forces on level ground" if law == CONTINUUM else law
-        axes[-1].barh(places + 0.27 * (k - 1), [missed(cases, law, name) for name in CONVENTIONS], 0.25, label=label)
+        axis.set_title(f"slope of {slope:g}°", fontsize=10)
+    places = np.arange(len(CONVENTIONS))
+    for k, (law, said) in enumerate(SAID.items() if cases else ()):
+        axes[-1].barh(places + 0.27 * (k - 1), [missed(cases, law, name) for name in CONVENTIONS], 0.25, label=said)
     axes[-1].set_yticks(places, [name.replace(", ", ",\n") for name in CONVENTIONS], fontsize=7)
     axes[-1].invert_yaxis()
     axes[-1].set_xlabel("RMS error of the resistance over level ground [-]")
@@ -191,9 +212,9 @@ def draw(measured: Measured, figure: Any) -> None:
 def _draw_ratios(axis: Any, groups: dict[str, list[dict[str, Any]]]) -> None:
     """Draw each plate's resistance over level ground, a row for each direction of motion."""
     for row, own in enumerate(groups.values()):
-        for k, name in enumerate(SHOWN):
+        for k, name in enumerate((SURFACE_S, GRAVITY_S)):
             some = [case["ratios"]["rft3d"][name] for case in own]
-            label = name if row == 0 else None
+            label = f"rft3d, {name}" if row == 0 else None
             axis.plot(some, [row - 0.15 * (k + 1)] * len(own), "x", color=f"C{k}", label=label)
         label = "continuum" if row == 0 else None
         axis.plot([case["continuum"] for case in own], [row] * len(own), "ko", fillstyle="none", label=label)
