@@ -7,7 +7,7 @@ import pytest
 from rftsim_mpm.campaign import DATA, results
 from rftsim_mpm.slope import Slope
 
-from rftsim.validation.slopes import CONTINUUM, CONVENTIONS, LAWS, compare, resistance
+from rftsim.validation.slopes import CONTINUUM, CONVENTIONS, LAWS, compare, left_over, resistance
 
 PLATES = [Slope(beta=beta, gamma=gamma) for beta, gamma in ((0.0, 90.0), (90.0, 0.0), (40.0, 40.0), (-40.0, -40.0))]
 
@@ -51,6 +51,16 @@ def test_conventions_differ_by_cosines():
     assert by_kind == pytest.approx(
         {(False, False): 1.0, (True, False): 1 / np.cos(theta), (False, True): np.cos(theta)}
     )
+
+
+def test_what_is_left_over_is_fitted():
+    """Ratios made by the formula give back its two numbers, downhill and uphill, and miss nothing."""
+    angles = [(slope, gamma) for slope in (-20.0, 10.0, 20.0) for gamma in (0.0, 40.0, 90.0)]
+    cases = []
+    for slope, gamma in angles:
+        sine, along = np.sin(np.radians(slope)), np.cos(np.radians(gamma))
+        cases.append({"slope": slope, "gamma": gamma, "continuum": 1.0 - 0.7 * sine * along - 1.4 * sine**2})
+    assert left_over(cases) == pytest.approx((0.7, 1.4, 0.0), abs=1e-12)
 
 
 @pytest.fixture(scope="module")
