@@ -59,8 +59,8 @@ class Course:
     """Place of the body on the grid, along each horizontal axis [cells]."""
     gravity: Array | float = 9.81
     """Acceleration, (dim,), or the strength of one along -z [m/s^2]."""
-    wall_friction: float = 0.0
-    """Friction between the sand and the walls beside and below it; infinite where it sticks [-]."""
+    wall_friction: Array | float = 0.0
+    """Friction of the lower and upper wall across each axis, (dim, 2), or of all; infinite where sand sticks [-]."""
 
     @property
     def level(self) -> float:

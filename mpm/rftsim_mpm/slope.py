@@ -73,14 +73,19 @@ class Slope(Plate):
 
 
 def course(job: Slope) -> Course:
-    """Return the plate's way through the slope: always the same travel, and sand that sticks to floor and walls."""
+    """Return the plate's way through the slope: always the same travel, and sand that sticks to floor and walls.
+
+    Where a wall is a mirror in the middle of the plate, it does not.
+    """
     way = plate.course(job)
+    friction = np.full((job.dim, 2), math.inf)
+    friction[1:-1, 0] = 0.0 if way.mirrors[-1] else math.inf
     return dataclasses.replace(
         way,
         approach=job.buried * job.length,
         mirrors=(False, *way.mirrors[1:]),
         gravity=job.gravity,
-        wall_friction=math.inf,
+        wall_friction=friction,
     )
 
 
