@@ -16,7 +16,7 @@ from rftsim.law.rigid import surface_force
 from rftsim.sand.medium import Sand
 from rftsim.surface.triangles import Array, make_surface
 from rftsim.validation.shipped import Results, outcome, shipped
-from rftsim.validation.study import Measured, Request, Row, at_most, near
+from rftsim.validation.study import Measured, Request, Row, at_most
 
 LAWS: Final = ("rft3d", "rft2d")
 """Laws that the conventions are tried with."""
@@ -52,6 +52,10 @@ CONVENTIONS: Final = {
     "surface's up, depth along normal, times cos θ": Convention(True, False, True),
 }
 """Conventions by name."""
+PLACE: Final = ("slope", "beta", "gamma")
+"""Names of what tells plates in the same sand apart."""
+VARIED: Final = {"cells": "{:g} cells", "dim": "{:d} dimensions", "mu_int": "μ_int {:g}"}
+"""What is varied to tell what it changes, and how it is said."""
 SAID: Final = {CONTINUUM: "continuum's own forces on level ground", **{law: law for law in LAWS}}
 """What the laws are called in tables."""
 
@@ -62,26 +66,26 @@ def jobs(request: Request) -> dict[str, Callable[[], Any]]:
 
 
 def compare(results: Results) -> dict[str, list[dict[str, Any]]]:
-    """Resistance of each plate on a slope, over that on level ground [-]: `cases` by convention and law, and `finer`.
+    """Resistance of each plate on a slope, over that on level ground [-]: `cases` by convention and law, and `others`.
 
     `cases` also have the error of the whole force, over its size on level ground, where the law is the continuum's own
-    forces there. `finer` are plates in cells smaller than the others', in the continuum alone.
+    forces there. `others` are plates for which nothing lies on level ground as they do to gravity: in other cells, in
+    space, in other sand, to tell what these change.
     """
     found = {Slope(**one["slope"]): np.array(one["force"]) for one in results}
     jobs = sorted(
         (job for job in found if job.slope and job.as_to_surface in found),
         key=lambda job: (abs(job.slope), job.gamma, job.slope, job.beta),
     )
-    coarse = max(job.dx for job in found)  # finer cells are there to tell what cells do to the continuum alone
     return {
         "cases": [_known(job, found) | _guessed(job, found) for job in jobs if job.as_to_gravity in found],
-        "finer": [_known(job, found) for job in jobs if job.dx < coarse],
+        "others": [_known(job, found) for job in jobs if job.as_to_gravity not in found],
     }
 
 
 def _known(job: Slope, found: dict[Slope, Array]) -> dict[str, float]:
     ratio = float((found[job] @ job.direction) / (found[job.as_to_surface] @ job.direction))
-    return {name: getattr(job, name) for name in ("slope", "beta", "gamma", "cells")} | {"continuum": ratio}
+    return {name: getattr(job, name) for name in (*PLACE, *VARIED)} | {"continuum": ratio}
 
 
 def _guessed(job: Slope, found: dict[Slope, Array]) -> dict[str, Any]:
@@ -170,7 +174,7 @@ def rows(measured: Measured) -> list[Row]:
     if not found:
         return []
     cases = found["cases"]
-    return [*_direction_rows(cases), *_error_rows(cases), *_finer_rows(cases, found["finer"])]
+    return [*_direction_rows(cases), *_error_rows(cases), *_other_rows(cases, found["others"])]
 
 
 def _direction_rows(cases: list[dict[str, Any]]) -> list[Row]:
@@ -178,8 +182,8 @@ def _direction_rows(cases: list[dict[str, Any]]) -> list[Row]:
     for (slope, name), own in grouped(cases).items():
         got = float(np.mean([case["continuum"] for case in own]))
         other = np.mean([case["ratios"]["rft3d"][GRAVITY_S] for case in own])
-        what = f"continuum: {slope:g}°, {name}: resistance over level ground, mean of {len(own)} plates"
-        note = f"rft3d, {GRAVITY_S}: {other:.2f}"
+        what = f"continuum: {slope:g}°, {name}: resistance over level ground"
+        note = f"rft3d, {GRAVITY_S}: {other:.2f}; plates: {len(own)}"
         table.append(Row(what, got, f"{SURFACE_S}, by definition", expected=1.0, note=note))
     return table
 
@@ -203,13 +207,18 @@ def _error_rows(cases: list[dict[str, Any]]) -> list[Row]:
     return table
 
 
-def _finer_rows(cases: list[dict[str, Any]], finer: list[dict[str, Any]]) -> list[Row]:
+def _other_rows(cases: list[dict[str, Any]], others: list[dict[str, Any]]) -> list[Row]:
+    """The rows of what cells, a third dimension and other sand do to the resistance over level ground."""
     table = []
-    for one in finer:
-        (same,) = (case for case in cases if all(case[name] == one[name] for name in ("slope", "beta", "gamma")))
-        what = f"continuum: {abs(one['slope']):g}°, {direction(one)}, β {one['beta']:g}°, {one['cells']:g} cells"
-        expected = same["continuum"]
-        table.append(near(what, one["continuum"], expected, 0.1, f"the same, {same['cells']:g} cells"))
+    for one in others:
+        (same,) = (case for case in cases if all(case[name] == one[name] for name in PLACE))
+        new, old = (
+            ", ".join(text.format(which[name]) for name, text in VARIED.items() if one[name] != same[name])
+            for which in (one, same)
+        )
+        what = f"continuum: {abs(one['slope']):g}°, {direction(one)}, β {one['beta']:g}°, {new}"
+        source = f"the same, {old}"
+        table.append(Row(what, one["continuum"], source, expected=same["continuum"]))
     return table
 
 
@@ -227,7 +236,9 @@ def draw(measured: Measured, figure: Any) -> None:
     axes[-1].set_yticks(places, [name.replace(", ", ",\n") for name in CONVENTIONS], fontsize=7)
     axes[-1].invert_yaxis()
     axes[-1].set_xlabel("RMS error of the resistance over level ground [-]")
-    axes[-1].legend(fontsize=7)
+    shown = [pair for axis in (axes[0], axes[-1]) for pair in zip(*axis.get_legend_handles_labels(), strict=True)]
+    if cases:
+        figure.legend(*zip(*shown, strict=True), loc="outside lower center", ncols=len(shown), fontsize=8)
 
 
 def _draw_ratios(axis: Any, groups: dict[str, list[dict[str, Any]]]) -> None:
@@ -242,4 +253,3 @@ def _draw_ratios(axis: Any, groups: dict[str, list[dict[str, Any]]]) -> None:
     axis.set_yticks(range(len(groups)), list(groups), fontsize=7)
     axis.set_xlabel("resistance over that on level ground [-]")
     axis.axvline(1.0, color="0.6", lw=0.8)
-    axis.legend(fontsize=6)

@@ -64,17 +64,28 @@ def test_what_is_left_over_is_fitted():
 
 
 @pytest.fixture(scope="module")
-def cases():
-    return compare(results(DATA / "slopes"))["cases"]
+def found():
+    return compare(results(DATA / "slopes"))
 
 
-def test_every_slope_has_its_level_ground(cases):
-    """Each plate on a slope in coarse cells is compared, and both ways along it are there."""
+@pytest.fixture(scope="module")
+def cases(found):
+    return found["cases"]
+
+
+def test_every_slope_has_its_level_ground(found):
+    """Each plate on a slope is compared, and both ways along both slopes are there."""
     jobs = [Slope(**one["slope"]) for one in results(DATA / "slopes")]
-    coarse = max(job.dx for job in jobs)
-    assert len(cases) == sum(job.slope != 0.0 and job.dx == coarse for job in jobs)
-    drags = {case["slope"] for case in cases if case["gamma"] == 0.0}
+    assert len(found["cases"]) + len(found["others"]) == sum(job.slope != 0.0 for job in jobs)
+    drags = {case["slope"] for case in found["cases"] if case["gamma"] == 0.0}
     assert drags == {-20.0, -10.0, 10.0, 20.0}
+
+
+def test_cells_half_as_large_change_little(found):
+    """Resistance over level ground is within 0.04 of that in coarse cells."""
+    for one in (other for other in found["others"] if other["cells"] == 20.0):
+        (same,) = (case for case in found["cases"] if all(case[n] == one[n] for n in ("slope", "beta", "gamma")))
+        assert one["continuum"] == pytest.approx(same["continuum"], abs=0.04)
 
 
 def test_sand_takes_power_and_gives_none():
