@@ -144,7 +144,8 @@ def test_terrain_that_is_a_plane_is_a_plane(slope):
     (one, first), (other, second) = found
     assert one.reasons == other.reasons
     assert one.notes == other.notes
-    assert (first.geom_contype == second.geom_contype).all()
+    for name in ("floor", "box", "sole"):
+        assert first.geom(name).contype == second.geom(name).contype
     stands = [standing(model, mujoco.MjData(model)) for _, model in found]
     assert stands[0].qpos == pytest.approx(stands[1].qpos, abs=1e-9)
     assert stands[0].trees[0].weight == pytest.approx(stands[1].trees[0].weight)
@@ -241,6 +242,16 @@ def test_the_ground_is_the_terrain():
     found = ground(model, mujoco.MjData(model))
     np.testing.assert_allclose(found.height_at(x, y), made.height_at(x, y), atol=1e-12)
     np.testing.assert_allclose(found.normal_at(x, y), made.normal_at(x, y), atol=1e-12)
+
+
+@pytest.mark.parametrize("terrain", ["0.1", "slope=5", "dunes,amplitude=0.03"])
+def test_a_second_bed_lies_where_the_first_does(terrain):
+    spec = spec_of(FOOT + FOOT.replace('"foot" pos="0 0', '"other" pos="1 0').replace("sole", "heel"))
+    first = add_sand(spec, SAND, bodies=["foot"], terrain=terrain)
+    second = add_sand(spec, SAND, bodies=["other"], name="second")
+    x, y = np.random.default_rng(0).uniform(-9.0, 9.0, size=(2, 50))
+    np.testing.assert_allclose(second.terrain.height_at(x, y), first.terrain.height_at(x, y), atol=1e-12)
+    assert len(rftsim.instances(spec.compile())) == 2
 
 
 # Slopes ---------------------------------------------------------------------------------------------------------------
