@@ -184,7 +184,7 @@ def add_sand(
 
 
 def _felt(draft: Draft, choice: Choice, law: Law, wheels: "Mapping[str, Wheel] | Iterable[str]") -> Felt:
-    """The bodies that feel the sand, with those that are wheels, which a planar law finds to stay in its plane."""
+    """The bodies that feel the sand, some of them as wheels; those that can leave the plane of a law are refused."""
     felt = felt_bodies(draft.model, draft.data, choice)
     check_planar(draft.model, draft.data, felt.surfaces, law, choice.plane)
     wheeled = rolling(draft.model, felt.surfaces, wheels)
