@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import rftsim
 from rftsim.model import drawing, relief
 from rftsim.model.draft import make_draft
-from rftsim.view import cameras, ground, look, render
+from rftsim.view import cameras, fields, look, render
 from rftsim.view.drawing import Shown
 
 EXTENT = 0.5
@@ -47,7 +47,7 @@ GROUNDS = {
 }
 
 
-def fields(name, focus):
+def sampled(name, focus):
     under, marks = GROUNDS[name]
     levels = relief.make_levels(under, marks, GRAIN, EXTENT)
     surface = under if marks is None else Rutted(under)
@@ -68,7 +68,7 @@ def within(points, level, field, margin=0.0):
 @pytest.mark.parametrize("name", GROUNDS)
 def test_what_is_seen_lies_on_the_ground(name):
     """Vertices lie on it exactly where no finer field is above them, except on rims, on the coarser field's edges."""
-    levels, found, surface = fields(name, (1.3, -0.7))
+    levels, found, surface = sampled(name, (1.3, -0.7))
     for k, (level, field) in enumerate(zip(levels, found, strict=True)):
         points = vertices(level, field)
         inner = (
@@ -82,7 +82,7 @@ def test_what_is_seen_lies_on_the_ground(name):
 
 @pytest.mark.parametrize("name", GROUNDS)
 def test_a_finer_field_is_not_hidden_by_the_coarser_one_and_joins_it(name):
-    levels, found, _ = fields(name, (0.4, 2.2))
+    levels, found, _ = sampled(name, (0.4, 2.2))
     for fine, inner, coarse, outer in zip(levels, found, levels[1:], found[1:], strict=False):
         points, edge = vertices(fine, inner), 1e-9 + coarse.cell
         drawn = heights_of(coarse, outer, points)
@@ -120,8 +120,8 @@ def test_fields_move_by_whole_periods_of_the_grain_and_stay_over_one_another(x, 
 
 
 def test_a_field_that_has_moved_shows_the_same_heights():
-    levels, before, _ = fields("ruts in dunes", (0.0, 0.0))
-    _, after, _ = fields("ruts in dunes", (0.45, -0.31))
+    levels, before, _ = sampled("ruts in dunes", (0.0, 0.0))
+    _, after, _ = sampled("ruts in dunes", (0.45, -0.31))
     for level, one, other in zip(levels[:1], before, after, strict=False):
         shift = np.rint((other.centre - one.centre) / level.cell).astype(int)
         assert shift.any()
@@ -153,7 +153,7 @@ def laid(monkeypatch):
         draft = make_draft(spec)
         rftsim.add_sand(spec, draw=False, terrain=-10.0)
         drawing.write_drawing(spec, "sand", getattr(surface, "under", surface), draft, marks)
-        for module in (ground, cameras):
+        for module in (fields, cameras):
             monkeypatch.setattr(module, "surface_of", lambda model, data, bed: surface)
         model = spec.compile()
         return model, [at(model, place) for place in places]
@@ -194,7 +194,7 @@ def test_a_model_is_compiled_with_its_terrain_drawn_and_keeps_its_statistics(lai
 def test_following_draws_the_sand_and_changes_nothing_else(laid):
     surface = Rutted(dunes())
     model, (near, far) = laid(surface, MARKS, ((0.0, 0.0, 0.5), (3.0, -2.0, 0.5)))
-    before, own = copy.copy(model), ground.Ground(model)
+    before, own = copy.copy(model), fields.Fields(model)
     own.follow(near)
     assert own.follow(near) == []
     changed = own.follow(far)
@@ -220,7 +220,7 @@ def same(one, other):
 def test_a_mark_changes_the_finest_field_alone(laid):
     surface = Rutted(rftsim.FreeSurface(), place=0.3)
     model, (data,) = laid(surface, MARKS)
-    own = ground.Ground(model)
+    own = fields.Fields(model)
     own.follow(data)
     surface.place = 0.32
     assert own.follow(data) == [int(model.geom("sand_surface").dataid[0])]

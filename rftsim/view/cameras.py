@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from rftsim.model.bounds import bounds, corners
 from rftsim.model.readout import instances
 from rftsim.surface.triangles import Array
-from rftsim.view.ground import surface_of
+from rftsim.view.fields import surface_of
 
 Camera: TypeAlias = int | str | mujoco.MjvCamera
 """Id or name of a camera of the model, or a free camera."""

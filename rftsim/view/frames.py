@@ -15,7 +15,7 @@ from rftsim.model.shaping import Fineness, body_surface
 from rftsim.model.standing import moving_weight
 from rftsim.surface.triangles import Array
 from rftsim.view.forces import resultants
-from rftsim.view.ground import surface_of
+from rftsim.view.fields import surface_of
 from rftsim.view.tiles import Tiles
 
 

@@ -16,7 +16,7 @@ SEEN: Final = 1e-3
 """Change of a height that is drawn, over the cell."""
 
 
-class Ground:
+class Fields:
     """The height fields of a model's beds, which `follow` the bodies and show the sand as it is in some data.
 
     Args:
@@ -30,7 +30,7 @@ class Ground:
             kind = int(mujoco.mjtGeom.mjGEOM_HFIELD)
             geoms = [geom for geom, name in drawn.items() if name == bed.name and model.geom_type[geom] == kind]
             if geoms:
-                self._beds.append(_Fields(model, bed, geoms))
+                self._beds.append(_Bed(model, bed, geoms))
 
     def follow(self, data: mujoco.MjData) -> list[int]:
         """Take over the surface of the sand and the places of the bodies from the model's data.
@@ -44,8 +44,8 @@ class Ground:
         return [changed for bed in self._beds for changed in bed.follow(data)]
 
 
-class _Fields:
-    """The height fields of one bed, finest first."""
+class _Bed:
+    """The height fields of a bed, finest first."""
 
     def __init__(self, model: mujoco.MjModel, bed: Instance, geoms: Sequence[int]) -> None:
         self._model, self._bed = model, bed
