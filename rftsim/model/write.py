@@ -7,7 +7,9 @@ import mujoco
 
 from rftsim.engine import block as engine
 from rftsim.engine import seal
+from rftsim.engine.plugin import RUTS
 from rftsim.errors import SceneError
+from rftsim.law.layout import BED, BED_NUMBERS, record, ruts_size
 from rftsim.surface.triangles import Array
 
 
@@ -45,20 +47,32 @@ def write_bed(spec: mujoco.MjSpec, carrier: Carrier, bed: Array, surfaces: Mappi
     Args:
         spec: The model; every body that feels the sand has its name.
         carrier: The plugin instance that is made.
-        bed: Packed sand.
+        bed: Packed sand, with its terrain where it has one.
         surfaces: Packed surface of each body that feels the sand, by body name.
     """
     spec.activate_plugin(carrier.plugin)
-    spec.add_plugin(name=carrier.name, plugin_name=carrier.plugin, active=True)
-    numbers = seal.sealed_bed(bed, carrier.name)
-    spec.add_numeric(name=engine.SAND_MARKER + carrier.name, data=numbers, size=numbers.size)
+    own, terrain = bed[:BED_NUMBERS], bed[BED_NUMBERS:]
+    size = int(ruts_size(record(own, BED)))
+    instance = spec.add_plugin(name=carrier.name, plugin_name=carrier.plugin, active=True)
+    if size:
+        instance.config = {RUTS: str(size)}
+    _write(spec, engine.SAND_MARKER, "", carrier.name, seal.sealed_bed(own, carrier.name))
+    if terrain.size:
+        numbers = seal.sealed_terrain(terrain, carrier.name)
+        _write(spec, engine.TERRAIN_MARKER, engine.MORE_TERRAIN_MARKER, carrier.name, numbers)
     for body, data in surfaces.items():
         _attach(spec.body(body).plugin, carrier)
-        numbers = seal.sealed_surface(data, body, carrier.name)
-        for first in range(0, numbers.size, engine.CHUNK):
-            chunk = numbers[first : first + engine.CHUNK]
-            marker = f"{engine.MORE_MARKER}{first // engine.CHUNK}:" if first else engine.BODY_MARKER
-            spec.add_numeric(name=marker + body, data=chunk, size=chunk.size)
+        _write(
+            spec, engine.BODY_MARKER, engine.MORE_MARKER, body, seal.sealed_surface(data, body, carrier.name)
+        )  # fmt: skip
+
+
+def _write(spec: mujoco.MjSpec, marker: str, more: str, owner: str, numbers: Array) -> None:
+    """Put numbers into numerics that are named after their owner, the first by a marker and the others by another."""
+    for first in range(0, numbers.size, engine.CHUNK):
+        chunk = numbers[first : first + engine.CHUNK]
+        name = (f"{more}{first // engine.CHUNK}:" if first else marker) + owner
+        spec.add_numeric(name=name, data=chunk, size=chunk.size)
 
 
 def write_sensors(spec: mujoco.MjSpec, carrier: Carrier, bodies: Iterable[str]) -> None:

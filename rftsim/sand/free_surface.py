@@ -2,12 +2,25 @@
 
 import dataclasses
 import math
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
+
+
+class GroundLike(Protocol):
+    """A free surface, of whatever kind, that is asked for heights, normals and depths."""
+
+    def depth(self, points: ArrayLike) -> Any:
+        """Depth of points below the surface along its normal [m], positive in the sand; points [m], (3,) or (n, 3)."""
+
+    def height_at(self, x: ArrayLike, y: ArrayLike) -> Any:
+        """Height of the surface over places [m]; x and y [m] of any one shape."""
+
+    def normal_at(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """Upward unit normal of the surface over places, shape (..., 3); x and y [m] of any one shape."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -39,6 +52,11 @@ class FreeSurface:
     def offset(self) -> float:
         """The product of the normal and any point on the surface, normal . x [m]."""
         return self.height * self.normal[2]
+
+    @property
+    def ceiling(self) -> "FreeSurface":
+        """A plane that no point of the surface lies above: itself."""
+        return self
 
     def depth(self, points: ArrayLike) -> Any:
         """Depth of points below the surface along its normal [m], positive in the sand.

@@ -14,7 +14,7 @@ import numpy as np
 from rftsim.errors import RftsimError
 from rftsim.model.readout import instances
 from rftsim.model.standing import moving_weight
-from rftsim.run.robot import total_force
+from rftsim.run.robot import against_gravity, total_force
 from rftsim.view.cameras import framing
 from rftsim.view.drawing import Drawing, Shown
 from rftsim.view.fields import Fields
@@ -132,8 +132,8 @@ class Live:
 
     def texts(self) -> tuple[str, str]:
         """Two columns of text: the time, the sand, and the keys."""
-        weight, up = moving_weight(self.model), instances(self.model)[0].bed.up
-        lift = float(total_force(self.model, self.data) @ up)
+        weight = moving_weight(self.model)
+        lift = against_gravity(self.model, total_force(self.model, self.data))
         carried = f"{100.0 * lift / weight:.0f} % of {weight:.4g} N" if weight > 0.0 else f"{lift:.4g} N"
         state = [
             ("time", f"{self.data.time:.2f} s{', paused' if self.paused else ''}"),

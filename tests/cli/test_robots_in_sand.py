@@ -102,7 +102,7 @@ def test_run_without_settling_falls(capsys, robot):
 def test_the_options_of_a_model_file(capsys, robot):
     """The bodies that feel the sand, its height and the keyframe, of `inspect` and `run` alike."""
     coarse = ("inspect", robot, "--reduction", 0.9)
-    told = report(capsys, *coarse, "--bodies", "left,right", "--surface", 0.3, "--keyframe", "wide")
+    told = report(capsys, *coarse, "--bodies", "left,right", "--terrain", 0.3, "--keyframe", "wide")
     assert not told["bodies"]["trunk"]["feels_sand"]
     assert told["surface"]["height"] == 0.3
     (stand,) = told["stands"]
