@@ -1,14 +1,15 @@
 """The height fields that draw a model's sand, kept as its surface is and where its bodies are."""
 
+import math
 from collections.abc import Sequence
-from typing import Any, Final
+from typing import Final
 
 import mujoco
 import numpy as np
 
+from rftsim.model.ground import ground
 from rftsim.model.readout import Instance, instances
 from rftsim.model.relief import Field, Level, centres, join_fields, sample_field
-from rftsim.sand.free_surface import FreeSurface
 from rftsim.surface.triangles import Array
 from rftsim.view.look import period, sand_geoms
 
@@ -51,14 +52,17 @@ class _Bed:
         self._model, self._bed = model, bed
         self._geoms = sorted(geoms, key=lambda geom: _level(model, geom).cell)
         self._levels = [_level(model, geom) for geom in self._geoms]
-        self._grain = period(model, self._geoms[0])
+        cell = self._levels[0].cell
+        self._grain = cell * 2.0 ** round(math.log2(period(model, self._geoms[0]) / cell))  # exactly, as it was made
         self._sampled: list[Field] = []
+        self._numbers = np.empty(0)
         self._shown: list[Field | None] = [None] * len(self._geoms)
         self._places = np.array(model.geom_pos[self._geoms])
         model.geom_sameframe[self._geoms] = int(mujoco.mjtSameFrame.mjSAMEFRAME_NONE)
 
     def follow(self, data: mujoco.MjData) -> list[int]:
-        surface = surface_of(self._model, data, self._bed)
+        surface = ground(self._model, data, self._bed.name)
+        self._forget()
         focus = data.xpos[list(self._bed.bodies), :2].mean(axis=0)
         around = centres(self._levels, focus, self._grain)
         self._sampled = [
@@ -69,6 +73,13 @@ class _Bed:
         changed = [self._write(k, field) for k, field in enumerate(fields) if self._differs(k, field)]
         self._model.geom_pos[self._geoms] = data.geom_xpos[self._geoms] = self._places
         return changed
+
+    def _forget(self) -> None:
+        """Forget what was looked up of a surface that has been moved, or changed in place, since."""
+        bed = self._bed
+        numbers = np.array([bed.bed.offset, *bed.bed.up, *(() if bed.relief is None else bed.relief)])
+        if not np.array_equal(numbers, self._numbers):
+            self._sampled, self._numbers = [], numbers
 
     def _stale(self, k: int, centre: Array) -> bool:
         """Whether a field has to be looked up: the finest always, for marks, and others at another place."""
@@ -98,8 +109,3 @@ def _level(model: mujoco.MjModel, geom: int) -> Level:
     one = model.geom_dataid[geom]
     cells = int(model.hfield_ncol[one]) - 1
     return Level(cells, 2.0 * float(model.hfield_size[one, 0]) / cells)
-
-
-def surface_of(model: mujoco.MjModel, data: mujoco.MjData, bed: Instance) -> Any:
-    """The surface of a bed as it is in some data."""
-    return FreeSurface(float(bed.bed.offset / bed.bed.up[2]), tuple(bed.bed.up.tolist()))
