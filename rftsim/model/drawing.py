@@ -15,7 +15,7 @@ from rftsim.sand.free_surface import FreeSurface
 from rftsim.sand.ruts import Ruts
 from rftsim.sand.terrain import Terrain
 
-SAND_RGB: Final = (0.70, 0.61, 0.47)
+SAND_RGB: Final = (0.70, 0.60, 0.45)
 """Colour of the drawn sand, in the mean."""
 GRAIN_RGB: Final = (0.50, 0.42, 0.30)
 """Colour of the grains on it, where MuJoCo marks some."""
@@ -23,7 +23,7 @@ PERIOD: Final = 0.2
 """Side of the texture of grains, which repeats, over the extent of what can move."""
 PIXELS: Final = 256
 """Side of the texture [pixels]."""
-SHINE: Final = 0.2
+SHINE: Final = 0.1
 """Light that the drawn sand gives off itself."""
 THICK: Final = 0.3
 """Thickness of fields below their lowest vertex, over the extent of what can move."""

@@ -7,7 +7,8 @@ from typing import Final
 import mujoco
 import numpy as np
 
-from rftsim.model.ground import ground
+from rftsim.law import layout
+from rftsim.model.ground import Ground, ground
 from rftsim.model.readout import Instance, instances
 from rftsim.model.relief import Field, Level, centres, join_fields, sample_field
 from rftsim.surface.triangles import Array
@@ -63,16 +64,24 @@ class _Bed:
     def follow(self, data: mujoco.MjData) -> list[int]:
         surface = ground(self._model, data, self._bed.name)
         self._forget()
-        focus = data.xpos[list(self._bed.bodies), :2].mean(axis=0)
-        around = centres(self._levels, focus, self._grain)
+        around = centres(self._levels, self._focus(surface, data), self._grain)
         self._sampled = [
-            sample_field(level, centre, surface.height_at) if self._stale(k, centre) else self._sampled[k]
+            sample_field(level, centre, surface.undisturbed_at if k else surface.height_at)
+            if self._stale(k, centre)
+            else self._sampled[k]
             for k, (level, centre) in enumerate(zip(self._levels, around, strict=True))
         ]
         fields = join_fields(self._levels, self._sampled)
         changed = [self._write(k, field) for k, field in enumerate(fields) if self._differs(k, field)]
         self._model.geom_pos[self._geoms] = data.geom_xpos[self._geoms] = self._places
         return changed
+
+    def _focus(self, surface: Ground, data: mujoco.MjData) -> Array:
+        """The middle of where marks are, or of the bodies where there are none, x and y [m]."""
+        places: Array = data.xpos[list(self._bed.bodies), :2]
+        if surface.window is not None and layout.ruts_size(self._bed.bed):
+            places = np.array(surface.window)
+        return np.asarray(places.mean(axis=0))
 
     def _forget(self) -> None:
         """Forget what was looked up of a surface that has been moved, or changed in place, since."""
@@ -82,7 +91,7 @@ class _Bed:
             self._sampled, self._numbers = [], numbers
 
     def _stale(self, k: int, centre: Array) -> bool:
-        """Whether a field has to be looked up: the finest always, for marks, and others at another place."""
+        """Whether a field has to be looked up: the finest, which alone shows marks, always; others at another place."""
         return k == 0 or not self._sampled or (self._sampled[k].centre != centre).any()
 
     def _differs(self, k: int, field: Field) -> bool:
