@@ -77,7 +77,7 @@ def test_a_picture_of_any_model(capsys, robot, tmp_path):
 
 
 def test_a_film_of_any_model(capsys, robot, tmp_path):
-    """With ruts: thirty pictures a second, of the size of pictures; refused before the run where it cannot be written."""
+    """With ruts, thirty pictures a second, of the size of pictures; refused at once where it cannot be written."""
     av = pytest.importorskip("av")
     film = tmp_path / "robot.mp4"
     report(capsys, "run", robot, "--duration", 0.2, "--ruts", "--video", film)
