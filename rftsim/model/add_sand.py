@@ -125,7 +125,7 @@ def add_sand(
         wheels: Driven wheels, behind which the dynamic laws let the free surface drop: names, whose axis is then that
             of their hinge and whose radius that of their surface; or `Wheel` by name.
         sensors: Add the sensors.
-        draw: Draw the free surface.
+        draw: Draw the free surface, as a plane or as height fields that collide with nothing.
         force: `implicit`: the sand's force at the end of each step, which holds at rest and at long steps; `explicit`:
             at the velocity of the moment.
         tolerance: Error of a body's velocity, relative, to which the implicit force is solved for in each step, 1e-6 to
@@ -173,7 +173,7 @@ def add_sand(
     write_bed(spec, carrier, numbers, packed)
     write_sensors(spec, carrier, felt.surfaces if sensors else ())
     if draw:
-        write_drawing(spec, name, site.terrain, draft)
+        write_drawing(spec, name, site.terrain, draft, marks)
     choices = [*felt.choices, *_integrate(spec, force)]
     if not keep_floor:
         choices = say_ground(site.field, floors, remove_floors(spec, floors)) + choices
