@@ -55,7 +55,7 @@ def follow(sim: Simulation, duration: float, watch: Watch | None = None, shots: 
     frames: list[Frame] = []
     rows: list[Array] = []
     pending: list[Array] = []
-    until = AVERAGE
+    until = sim.time + AVERAGE
     while sim.time < duration:
         sim.step()
         moved = [part for body in sim.bodies for part in (body.position, body.velocity)]

@@ -1,0 +1,170 @@
+"""A foot pressed twice into the same place: how much weaker the second push is, and what print the first one leaves."""
+
+import dataclasses
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rftsim_mpm.bed import level_bed
+from rftsim_mpm.body import Body
+from rftsim_mpm.errors import MpmError, check_not_negative, check_positive
+from rftsim_mpm.follow import follow
+from rftsim_mpm.material import Material, stiffness
+from rftsim_mpm.plate import spread
+from rftsim_mpm.reading import thinned
+from rftsim_mpm.relief import Relief, read_relief
+from rftsim_mpm.shapes import box
+from rftsim_mpm.simulation import Simulation, Watch
+
+Array = NDArray[np.float64]
+
+
+@dataclasses.dataclass(frozen=True)
+class Footprint:
+    """A flat foot, upright walls above it, pressed into a level bed, lifted out, and pressed again, in plane strain."""
+
+    length: float = 0.05
+    """Length of the foot [m]."""
+    depth: float = 0.03
+    """How deep its base is pressed first [m]."""
+    again: float = 0.045
+    """How deep its base is pressed the second time [m]."""
+    speed: float = 0.1
+    """Speed of the foot, down and up [m/s]."""
+    rest: float = 0.3
+    """Time for the print's walls to slide, after the foot has left [s]."""
+    mu_int: float = 0.4
+    """Internal friction of the sand [-]."""
+    mu_surf: float = 0.35
+    """Friction between sand and foot [-]."""
+    rho: float = 1512.0
+    """Critical density of the sand [kg/m^3]."""
+    cells: float = 10.0
+    """Cells per length of the foot."""
+    softness: float = 0.01
+    """Strain of the sand under the bearing pressure of the greatest depth, rho g z N_q / E."""
+    bed: float = 1.0
+    """Factor on the sand beside and below the foot."""
+
+    def __post_init__(self) -> None:
+        check_positive(self, "length", "depth", "again", "speed", "rest", "mu_int", "rho", "softness", "bed")
+        check_not_negative(self, "mu_surf")
+        if not 4.0 <= self.cells <= 200.0:
+            raise MpmError(f"cells must be in [4, 200], not {self.cells:g}")
+
+    @property
+    def quick(self) -> "Footprint":
+        """The same with six cells, and less sand around: a look, not a measurement."""
+        return dataclasses.replace(self, cells=6.0, bed=0.7 * self.bed)
+
+    @property
+    def dx(self) -> float:
+        """Size of a cell [m]."""
+        return self.length / self.cells
+
+    @property
+    def height(self) -> float:
+        """Height of the foot [m]: its top stays above the sand."""
+        return max(self.depth, self.again) + 0.5 * self.length
+
+    @property
+    def clear(self) -> float:
+        """How high above the undisturbed sand the base is lifted [m]."""
+        return 0.4 * self.length
+
+    @property
+    def level(self) -> float:
+        """Depth of the bed, in whole cells [m]."""
+        return math.ceil((max(self.depth, self.again) + 0.6 * self.margin) / self.dx) * self.dx
+
+    @property
+    def margin(self) -> float:
+        """Sand beside the foot [m]."""
+        return self.bed * spread(self.mu_int) * self.length
+
+
+class Prints(NamedTuple):
+    """Two pushes into one place, and the surface between them."""
+
+    first: tuple[Array, Array]
+    """Depth of the base below the undisturbed surface [m] and upward force [N/m] of the first push, (n,) each."""
+    second: tuple[Array, Array]
+    """The same of the second push."""
+    pressed: Relief
+    """The surface when the foot is as deep as it goes at first; x from its middle, here and in the next two."""
+    left: Relief
+    """The surface that the foot has left, walls slid."""
+    end: Relief
+    """The surface at the end of the second push."""
+
+    def ratio(self, depth: Array | float) -> Array:
+        """Return the second push's force over the first's at depths below the undisturbed surface [m]."""
+        found: Array = np.interp(depth, *self.second) / np.interp(depth, *self.first)
+        return found
+
+    @property
+    def report(self) -> dict[str, Any]:
+        """The numbers as JSON has them, by name and unit."""
+        depth = float(self.first[0][-1])
+        print_depth = -float(self.left.height[0])
+        shares = [0.25, 0.5, 0.75, 0.95]
+        return {
+            "force_N_m": float(np.interp(0.95 * depth, *self.first)),
+            "ratios": dict(zip(map(str, shares), self.ratio(np.array(shares) * depth).tolist(), strict=True)),
+            "print_depth_m": print_depth,
+            "rim_m": float(self.left.height.max()),
+            "rim_over_print": self.left.raised / self.left.hollow,
+            "wall_deg": self.left.wall_slope(),
+            "missed": self.left.missed,
+        }
+
+    @property
+    def series(self) -> dict[str, Any]:
+        """The pushes and the surfaces as files keep them."""
+        pushes = {
+            name: thinned(depth_m=push[0], force_N_m=push[1])
+            for name, push in (("first", self.first), ("second", self.second))
+        }
+        surfaces = {name: getattr(self, name).kept() for name in ("pressed", "left", "end")}
+        return pushes | surfaces
+
+
+def press(study: Footprint, watch: Watch | None = None) -> Prints:
+    """Press the foot in, lift it out, let the sand come to rest, and press it in again; a half of it is modelled."""
+    sim = _prepared(study)
+    foot = sim.bodies[0]
+    away = study.depth + study.clear
+    ways = [(-study.speed, study.depth / study.speed), (study.speed, away / study.speed), (0.0, study.rest),
+            (-study.speed, (study.clear + study.again) / study.speed)]  # fmt: skip
+    total = sum(duration for _, duration in ways)
+    pushes, reliefs = [], []
+    for velocity, duration in ways:
+        foot.velocity = np.array([0.0, velocity])
+        end = sim.time + duration
+        track = follow(sim, end, None if watch is None else lambda sim, share, end=end: watch(sim, share * end / total))
+        base = study.level + 0.5 * study.height - track.position[:, 0, 1]
+        pushes.append((base, 2.0 * track.force[:, 0, 1]))
+        reliefs.append(read_relief(sim, study.level))
+    return Prints(pushes[0], pushes[3], reliefs[0], reliefs[2], reliefs[3])
+
+
+def _prepared(study: Footprint) -> Simulation:
+    """The bed's half beside a mirror, the foot's base on it."""
+    dx = study.dx
+    width = math.ceil((0.5 * study.length + study.margin) / dx) * dx
+    depth = max(study.depth, study.again)
+    material = Material.of_density(
+        study.mu_int, study.rho, stiffness(study.rho, 9.81, depth, study.mu_int, study.softness)
+    )
+    foot = Body(
+        box(study.length, study.height),
+        np.array([0.0, study.level + 0.5 * study.height]),
+        np.zeros(2),
+        study.mu_surf,
+    )
+    friction = np.array([[0.0, 0.0], [study.mu_int, 0.0]])
+    size = (width, study.level + study.clear + study.height + 4.0 * dx)
+    bed = level_bed(material, (width, study.level), dx)
+    return Simulation(material, bed, dx, size, bodies=[foot], wall_friction=friction)
