@@ -45,12 +45,14 @@ class Blade:
     """Cells per depth of the blade."""
     softness: float = 0.01
     """Strain of the sand under the bearing pressure of the blade's depth and its heap's height, rho g z N_q / E."""
+    calm: float = 0.01
+    """As in `Simulation` [s]."""
     bed: float = 1.0
     """Factor on the sand behind, ahead and below."""
 
     def __post_init__(self) -> None:
         check_positive(self, "depth", "thickness", "travel", "speed", "mu_int", "rho", "softness", "bed")
-        check_not_negative(self, "mu_surf")
+        check_not_negative(self, "mu_surf", "calm")
         if not 4.0 <= self.cells <= 200.0:
             raise MpmError(f"cells must be in [4, 200], not {self.cells:g}")
         if self.thickness < 1.06 * self.dx:
@@ -144,6 +146,6 @@ def _prepared(study: Blade) -> Simulation:
     friction = np.array([[0.0, 0.0], [study.mu_int, 0.0]])
     bed = level_bed(material, (width, study.level), dx)
     size = (width, study.level + height + 4.0 * dx)
-    sim = Simulation(material, bed, dx, size, bodies=[blade], wall_friction=friction)
+    sim = Simulation(material, bed, dx, size, bodies=[blade], wall_friction=friction, calm=study.calm)
     sim.clear_bodies()
     return sim

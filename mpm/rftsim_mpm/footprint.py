@@ -45,12 +45,14 @@ class Footprint:
     """Cells per length of the foot."""
     softness: float = 0.01
     """Strain of the sand under the bearing pressure of the greatest depth, rho g z N_q / E."""
+    calm: float = 0.01
+    """As in `Simulation` [s]."""
     bed: float = 1.0
     """Factor on the sand beside and below the foot."""
 
     def __post_init__(self) -> None:
         check_positive(self, "length", "depth", "again", "speed", "rest", "mu_int", "rho", "softness", "bed")
-        check_not_negative(self, "mu_surf")
+        check_not_negative(self, "mu_surf", "calm")
         if not 4.0 <= self.cells <= 200.0:
             raise MpmError(f"cells must be in [4, 200], not {self.cells:g}")
 
@@ -167,4 +169,4 @@ def _prepared(study: Footprint) -> Simulation:
     friction = np.array([[0.0, 0.0], [study.mu_int, 0.0]])
     size = (width, study.level + study.clear + study.height + 4.0 * dx)
     bed = level_bed(material, (width, study.level), dx)
-    return Simulation(material, bed, dx, size, bodies=[foot], wall_friction=friction)
+    return Simulation(material, bed, dx, size, bodies=[foot], wall_friction=friction, calm=study.calm)
