@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from rftsim_mpm.bed import level_bed
 from rftsim_mpm.body import Body
 from rftsim_mpm.errors import MpmError, check_not_negative, check_positive
-from rftsim_mpm.follow import follow
+from rftsim_mpm.follow import stage
 from rftsim_mpm.material import Material, stiffness
-from rftsim_mpm.reading import thinned
+from rftsim_mpm.reading import averaged
 from rftsim_mpm.relief import Relief, read_relief
 from rftsim_mpm.shapes import box
 from rftsim_mpm.simulation import Simulation, Watch
@@ -31,7 +31,7 @@ class Blade:
     """Depth of its lower edge [m]."""
     thickness: float = 0.012
     """Thickness of the blade [m]."""
-    travel: float = 0.3
+    travel: float = 0.24
     """Length of the way [m]."""
     speed: float = 0.1
     """Speed of the blade [m/s]."""
@@ -45,7 +45,7 @@ class Blade:
     """Cells per depth of the blade."""
     softness: float = 0.01
     """Strain of the sand under the bearing pressure of the blade's depth and its heap's height, rho g z N_q / E."""
-    calm: float = 0.01
+    calm: float = 0.005
     """As in `Simulation` [s]."""
     bed: float = 1.0
     """Factor on the sand behind, ahead and below."""
@@ -90,19 +90,33 @@ class Heap(NamedTuple):
     """The surface after each of SHARES of the way; x from the blade's leading face."""
 
     def drag(self, low: float, high: float) -> float:
-        """Return the mean drag from one travel to another [N/m]."""
-        own = (self.travel >= low) & (self.travel <= high)
-        return -float(self.force[own, 0].mean())
+        """Return the mean drag from one share of the way to another [N/m]."""
+        way = self.travel / self.travel[-1]
+        return -float(self.force[(way >= low) & (way <= high), 0].mean())
+
+    @property
+    def growth(self) -> tuple[float, float]:
+        """Drag without a heap [N/m], and growth with the travel [N/m^2], of a line through the first half of the way.
+
+        Its first twentieth, in which the sand only begins to yield, is left out.
+        """
+        way = self.travel / self.travel[-1]
+        own = (way >= 0.05) & (way <= 0.5)
+        slope, start = np.polyfit(self.travel[own], -self.force[own, 0], 1)
+        return float(start), float(slope)
 
     @property
     def report(self) -> dict[str, Any]:
-        """The numbers as JSON has them, by name and unit, the last two for each of SHARES."""
+        """The numbers as JSON has them, by name and unit; lists are for each of SHARES."""
         ahead = [relief.part(0.0, math.inf) for relief in self.reliefs]
-        last = float(self.travel[-1])
+        start, slope = self.growth
         return {
-            "shares": list(SHARES),
-            "drag_N_m": [self.drag((share - 0.05) * last, share * last) for share in SHARES],
+            "start_N_m": start,
+            "growth_N_m2": slope,
+            "travel_m": [share * float(self.travel[-1]) for share in SHARES],
+            "drag_N_m": [self.drag(share - 0.05, share) for share in SHARES],
             "heap_m": [float(relief.height.max()) for relief in ahead],
+            "front_deg": [relief.front_slope() for relief in ahead],
             "raised_m2": [relief.raised for relief in ahead],
             "missed": [relief.missed for relief in self.reliefs],
         }
@@ -111,7 +125,7 @@ class Heap(NamedTuple):
     def series(self) -> dict[str, Any]:
         """Drag and surfaces as files keep them."""
         return {
-            **thinned(travel_m=self.travel, force_N_m=self.force),
+            **averaged(way_m=self.travel, force_N_m=self.force),
             "surfaces": [relief.kept() for relief in self.reliefs],
         }
 
@@ -122,9 +136,8 @@ def plow(study: Blade, watch: Watch | None = None) -> Heap:
     start = float(sim.bodies[0].position[0])
     total = study.travel / study.speed
     tracks, reliefs = [], []
-    for share in SHARES:
-        end = share * total
-        tracks.append(follow(sim, end, None if watch is None else lambda sim, done, end=end: watch(sim, done * end / total)))
+    for share, before in zip(SHARES, (0.0, *SHARES), strict=False):
+        tracks.append(stage(sim, (share - before) * total, total, watch))
         face = float(sim.bodies[0].position[0]) + 0.5 * study.thickness
         relief = read_relief(sim, study.level)
         reliefs.append(relief._replace(x=relief.x - face))

@@ -10,15 +10,18 @@ from numpy.typing import NDArray
 from rftsim_mpm.bed import level_bed
 from rftsim_mpm.body import Body
 from rftsim_mpm.errors import MpmError, check_not_negative, check_positive
-from rftsim_mpm.follow import follow
+from rftsim_mpm.follow import stage
 from rftsim_mpm.material import Material, stiffness
 from rftsim_mpm.plate import spread
-from rftsim_mpm.reading import thinned
+from rftsim_mpm.reading import averaged
 from rftsim_mpm.relief import Relief, read_relief
 from rftsim_mpm.shapes import box
 from rftsim_mpm.simulation import Simulation, Watch
 
 Array = NDArray[np.float64]
+
+SHARES = (0.2, 0.4, 0.6, 0.8, 0.95)
+"""Shares of the first push's depth at which both are compared [-]."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -101,21 +104,31 @@ class Prints(NamedTuple):
     end: Relief
     """The surface at the end of the second push."""
 
-    def ratio(self, depth: Array | float) -> Array:
-        """Return the second push's force over the first's at depths below the undisturbed surface [m]."""
-        found: Array = np.interp(depth, *self.second) / np.interp(depth, *self.first)
-        return found
+    def ratio(self, depth: Array) -> Array:
+        """Return the second push's force over the first's at depths below the undisturbed surface, (n,) [m].
+
+        Forces are means over a twentieth of the first push's depth to either side.
+        """
+        window = 0.05 * float(self.first[0][-1])
+        found = [[force[np.abs(z - d) <= window].mean() for d in depth] for z, force in (self.second, self.first)]
+        ratio: Array = np.array(found[0]) / np.array(found[1])
+        return ratio
+
+    @property
+    def touch(self) -> float:
+        """Depth at which the second push first feels a twentieth of the first push's last force [m]."""
+        feels = self.second[1] > 0.05 * self.first[1][-20:].mean()
+        return float(self.second[0][int(feels.argmax())])
 
     @property
     def report(self) -> dict[str, Any]:
-        """The numbers as JSON has them, by name and unit."""
-        depth = float(self.first[0][-1])
-        print_depth = -float(self.left.height[0])
-        shares = [0.25, 0.5, 0.75, 0.95]
+        """The numbers as JSON has them, by name and unit; ratios are the second push's force over the first's."""
+        depths = np.array(SHARES) * float(self.first[0][-1])
         return {
-            "force_N_m": float(np.interp(0.95 * depth, *self.first)),
-            "ratios": dict(zip(map(str, shares), self.ratio(np.array(shares) * depth).tolist(), strict=True)),
-            "print_depth_m": print_depth,
+            "depths_m": depths.tolist(),
+            "ratios": self.ratio(depths).tolist(),
+            "touch_m": self.touch,
+            "print_m": -float(self.left.height.min()),
             "rim_m": float(self.left.height.max()),
             "rim_over_print": self.left.raised / self.left.hollow,
             "wall_deg": self.left.wall_slope(),
@@ -126,7 +139,7 @@ class Prints(NamedTuple):
     def series(self) -> dict[str, Any]:
         """The pushes and the surfaces as files keep them."""
         pushes = {
-            name: thinned(depth_m=push[0], force_N_m=push[1])
+            name: averaged(depth_m=push[0], force_N_m=push[1])
             for name, push in (("first", self.first), ("second", self.second))
         }
         surfaces = {name: getattr(self, name).kept() for name in ("pressed", "left", "end")}
@@ -144,10 +157,8 @@ def press(study: Footprint, watch: Watch | None = None) -> Prints:
     pushes, reliefs = [], []
     for velocity, duration in ways:
         foot.velocity = np.array([0.0, velocity])
-        end = sim.time + duration
-        track = follow(sim, end, None if watch is None else lambda sim, share, end=end: watch(sim, share * end / total))
-        base = study.level + 0.5 * study.height - track.position[:, 0, 1]
-        pushes.append((base, 2.0 * track.force[:, 0, 1]))
+        track = stage(sim, duration, total, watch)
+        pushes.append((study.level + 0.5 * study.height - track.position[:, 0, 1], 2.0 * track.force[:, 0, 1]))
         reliefs.append(read_relief(sim, study.level))
     return Prints(pushes[0], pushes[3], reliefs[0], reliefs[2], reliefs[3])
 

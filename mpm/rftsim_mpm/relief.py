@@ -12,7 +12,7 @@ from rftsim_mpm.simulation import Simulation
 Array = NDArray[np.float64]
 
 FILLED = 0.5
-"""Share of the space that the sand fills at its surface [-]: what a kernel that is as wide above as below sees there."""
+"""Share of the space about a place in the surface that sand fills, as far above as below [-]."""
 WALL = (0.2, 0.8)
 """Shares of a hollow's depth between which the slope of its walls is read [-]."""
 
@@ -43,8 +43,7 @@ class Relief(NamedTuple):
 
     def at(self, x: Array | float) -> Array:
         """Return the height at places [m], between the nodes along straight lines."""
-        found: Array = np.interp(x, self.x, self.height)
-        return found
+        return np.asarray(np.interp(x, self.x, self.height))
 
     def part(self, low: float, high: float) -> "Relief":
         """Return the nodes from one place to another [m]."""
@@ -52,7 +51,7 @@ class Relief(NamedTuple):
         return Relief(self.x[own], self.height[own], self.missed)
 
     def wall_slope(self) -> float:
-        """Return the slope of the wall to the right of the lowest place, by a line between two shares of its depth [deg]."""
+        """Return the slope to the right of the lowest place, by a line between shares of its depth [deg]."""
         lowest = int(self.height.argmin())
         depth = -float(self.height[lowest])
         rising = self.height[lowest:] > -WALL[0] * depth
@@ -62,6 +61,10 @@ class Relief(NamedTuple):
         if len(own) < 2:
             return 90.0
         return math.degrees(math.atan(float(np.polyfit(self.x[own], self.height[own], 1)[0])))
+
+    def front_slope(self) -> float:
+        """Return the slope beyond the highest place, by a line between the same shares of its height [deg]."""
+        return Relief(self.x, -self.height, self.missed).wall_slope()
 
     def kept(self) -> dict[str, Any]:
         """Return places and heights as files keep them, to a hundredth of a millimetre."""
@@ -89,8 +92,8 @@ def read_relief(sim: Simulation, level: float) -> Relief:
     below, above = filled[rows, top], filled[rows, np.minimum(top + 1, filled.shape[1] - 1)]
     height = sim.dx * (top + (below - FILLED) / np.maximum(below - above, 1e-9))
     height[below < FILLED] = 0.0  # a column without sand
-    found = Relief(sim.dx * rows, height - level, 0.0)
-    return found._replace(missed=(found.area() + level * found.x[-1]) / float(area.sum()) - 1.0)
+    found = Relief(np.asarray(sim.dx * rows, float), height - level, 0.0)
+    return found._replace(missed=(found.area() + level * float(found.x[-1])) / float(area.sum()) - 1.0)
 
 
 def _filled(place: Array, share: Array, cells: NDArray[np.int64]) -> Array:

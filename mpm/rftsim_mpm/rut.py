@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rftsim_mpm.errors import check_not_negative, check_positive
-from rftsim_mpm.follow import Track, follow
-from rftsim_mpm.reading import thinned
+from rftsim_mpm.errors import MpmError, check_not_negative, check_positive
+from rftsim_mpm.follow import stage
+from rftsim_mpm.reading import averaged
 from rftsim_mpm.relief import Relief, read_relief
 from rftsim_mpm.simulation import Simulation, Watch
 from rftsim_mpm.wheel import Wheel, bed_depth, omega_of, prepare
@@ -18,6 +18,9 @@ Array = NDArray[np.float64]
 
 ENTRY = 0.4
 """Share of the first pass's way, at its beginning, in which the wheel still finds its depth and speed [-]."""
+
+FEWEST_RADII = 2.5
+"""Shortest way, in radii: the last radius of it, where the wheel leaves a heap, is not compared either [-]."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -52,7 +55,7 @@ class Pass(NamedTuple):
 
     def kept(self) -> dict[str, Any]:
         """Return the pass as files keep it, thinned."""
-        return thinned(travel_m=self.travel, speed_m_s=self.speed, sinkage_m=self.sinkage)
+        return averaged(travel_m=self.travel, speed_m_s=self.speed, sinkage_m=self.sinkage)
 
 
 class Passes(NamedTuple):
@@ -96,14 +99,10 @@ def follow_rut(study: Rut, watch: Watch | None = None) -> Passes:
     wheel, level = sim.bodies[0], bed_depth(study)
     start, rotation, mass = wheel.position.copy(), wheel.rotation.copy(), wheel.mass
     entry, spin = wheel.velocity.copy(), wheel.spin.copy()
-    total = 2.0 * study.time + study.rest
-
-    def run(duration: float) -> Track:
-        end = sim.time + duration
-        return follow(sim, end, None if watch is None else lambda sim, done: watch(sim, done * end / total))
+    total = 2.0 * (study.time + study.rest)
 
     def drive() -> Pass:
-        track = run(study.time)
+        track = stage(sim, study.time, total, watch)
         away = np.sign(study.rpm) * (track.position[:, 0, 0] - start[0])
         sunk = level + study.outer - track.position[:, 0, 1]
         return Pass(away, np.sign(study.rpm) * track.velocity[:, 0, 0], sunk)
@@ -113,14 +112,19 @@ def follow_rut(study: Rut, watch: Watch | None = None) -> Passes:
         return relief._replace(x=relief.x - start[0])
 
     first = drive()
+    if not first.travel[-1] > FEWEST_RADII * study.outer:
+        raise MpmError(
+            f"the wheel came {first.travel[-1]:.2g} m far; two passes are compared from {FEWEST_RADII:g} radii of "
+            f"{study.outer:g} m on: a longer duration, or another rpm"
+        )
     _hold(sim, study)
-    run(study.rest)
+    stage(sim, study.rest, total, watch)
     left = surface()
     wheel.position = np.array([start[0], level + _rest_height(left, study.outer)])
     wheel.rotation, wheel.velocity, wheel.spin, wheel.mass = rotation, entry, spin, mass
     second = drive()
     _hold(sim, study)
-    run(study.rest)
+    stage(sim, study.rest, total, watch)
     far = min(float(first.travel[-1]) - study.outer, float(second.travel[-1]))
     stretch = ENTRY * float(first.travel[-1]), far
     return Passes(first, second, left, surface(), stretch, abs(omega_of(study)) * study.outer)

@@ -173,7 +173,7 @@ class Simulation:
         p.select(self._kernels.order(p.x, self._low, 1.0 / self.dx, self._shape))
 
     def _filter(self, order: int, share: float = 1.0) -> None:
-        """XPIC of order m [Hammerquist and Nairn 2017]: v -> (1 - (1 - P)^m) v, P to the grid and back; or a share of it."""
+        """XPIC of order m [Hammerquist and Nairn 2017]: v -> (1 - (1 - P)^m) v, or a share of that change."""
         p = self.particles
         rest = p.v.copy()
         for _ in range(order):
