@@ -1,0 +1,324 @@
+"""Sand that remembers, against the continuum: a foot in its own print, a blade with its heap, a wheel in its own rut.
+
+Computes no continuum: reads the campaign `ruts` of `rftsim_mpm/data`, which says by what command it was made, and plays
+the same motions in MuJoCo. Plane strain has no sides, so bodies here are as wide as WIDTH, far wider than deep.
+"""
+
+import dataclasses
+import functools
+import inspect
+import math
+from collections.abc import Callable, Iterable
+from typing import Any, Final, NamedTuple
+
+import mujoco
+import numpy as np
+from rftsim_models.studio import new_scene
+from rftsim_models.wheels import GROUSER_WHEEL, WHEEL, build_wheel
+from rftsim_mpm.blade import SHARES, Blade
+from rftsim_mpm.footprint import Footprint
+from rftsim_mpm.rut import ENTRY, Rut
+
+from rftsim.model.add_sand import add_sand
+from rftsim.model.readout import wrenches
+from rftsim.run.scenes import POPPY
+from rftsim.sand.medium import Sand
+from rftsim.surface.triangles import Array
+from rftsim.validation.shipped import Results, outcome, shipped
+from rftsim.validation.study import Measured, Request, Row, near
+
+LAW: Final = "rft2d"
+"""The law that is played: of plane strain, and without the drop of the surface that ruts would count twice."""
+VARIANTS: Final[dict[str, dict[str, Any]]] = {"no ruts": {}} | (
+    {"ruts": {"ruts": True}} if "ruts" in inspect.signature(add_sand).parameters else {}
+)
+"""Options of `add_sand` by what the sand remembers."""
+ZETA: Final = 1e6
+"""Strength of the sand of foot and blade [N/m^3]: forces are proportional to it, and compared as ratios."""
+WIDTH: Final = 1.0
+"""Width of the bodies [m]."""
+MASS: Final = 1e9
+"""Mass of foot and blade, which the sand's force cannot slow down [kg]."""
+TIMESTEP: Final = 1e-3
+"""Time step of foot and blade [s]."""
+BOUNDS: Final = {"ratio": 0.2, "slip": 0.05, "sinkage": 0.3}
+"""How far laws with ruts may be off: in ratios of forces, in slip, and in sinkage over the continuum's [-]."""
+
+
+class Played(NamedTuple):
+    """A stage of a motion: where the body was, and what the sand did to it."""
+
+    travel: Array
+    """Displacement along x and z from where the model places the body, (n, 2) [m]."""
+    force: Array
+    """Force of the sand along x and z, (n, 2) [N/m]."""
+
+
+def jobs(request: Request) -> dict[str, Callable[[], Any]]:
+    """The job that reads the continuum, and a job for each motion and each memory of the sand."""
+    plays = {"foot": foot, "blade": blade, "wheel": wheel}
+    played = {
+        f"{name}/{variant}": functools.partial(play, variant) for name, play in plays.items() for variant in VARIANTS
+    }
+    return shipped("ruts", _continuum) | played
+
+
+def _continuum(results: Results) -> dict[str, list[dict[str, Any]]]:
+    """The shipped runs of each kind, from coarse to fine cells."""
+    kinds = {"footprint": "cells", "blade": "cells", "rut": "dx"}
+    found = {}
+    for kind, resolution in kinds.items():
+        own = [one for one in results if kind in one]
+        found[kind] = sorted(own, key=lambda one: float(one[kind][resolution]), reverse=resolution == "dx")
+    return found
+
+
+def _box(size: tuple[float, float], place: tuple[float, float], sand: Sand, variant: str) -> mujoco.MjModel:
+    """A box of a size along x and z [m], its middle at a place, on two slides over level sand."""
+    spec = new_scene("box", gravity=9.81, timestep=TIMESTEP)
+    body = spec.worldbody.add_body(name="box", pos=[place[0], 0.0, place[1]], gravcomp=1.0)
+    body.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=[0.5 * size[0], 0.5 * WIDTH, 0.5 * size[1]], mass=MASS)
+    for axis in ([1, 0, 0], [0, 0, 1]):
+        body.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
+    add_sand(spec, sand, LAW, terrain=0.0, draw=False, **VARIANTS[variant])
+    return spec.compile()
+
+
+def _play(model: mujoco.MjModel, stages: Iterable[tuple[float, float, float]]) -> list[Played]:
+    """Move a body on two slides at velocities along x and z [m/s], each for a duration [s]."""
+    data = mujoco.MjData(model)
+    index = model.body("box").id
+    played = []
+    for vx, vz, duration in stages:
+        rows = []
+        for _ in range(round(duration / model.opt.timestep)):
+            data.qvel[:] = vx, vz
+            mujoco.mj_step(model, data)
+            rows.append([*data.qpos, *wrenches(model, data).force[index, [0, 2]] / WIDTH])
+        table = np.array(rows)
+        played.append(Played(table[:, :2], table[:, 2:]))
+    return played
+
+
+def foot(variant: str) -> dict[str, Any]:
+    """Press the foot of the continuum's study twice: depth [m] and upward force per width and ZETA of both pushes."""
+    study = Footprint()
+    sand = Sand(rho_c=study.rho, mu_int=study.mu_int, mu_surf=study.mu_surf, zeta=ZETA)
+    model = _box((study.length, study.height), (0.0, 0.5 * study.height), sand, variant)
+    speed, away = study.speed, study.depth + study.clear
+    stages = [
+        (0.0, -speed, study.depth / speed),
+        (0.0, speed, away / speed),
+        (0.0, 0.0, study.rest),
+        (0.0, -speed, (study.clear + study.again) / speed),
+    ]
+    first, _, _, second = _play(model, stages)
+    return {
+        name: {"depth_m": (-push.travel[:, 1]).tolist(), "force": (push.force[:, 1] / ZETA).tolist()}
+        for name, push in (("first", first), ("second", second))
+    }
+
+
+def blade(variant: str) -> dict[str, Any]:
+    """Drag the blade of the continuum's study: travel [m] and drag per width and ZETA."""
+    study = Blade()
+    sand = Sand(rho_c=study.rho, mu_int=study.mu_int, mu_surf=study.mu_surf, zeta=ZETA)
+    height = study.depth + 1.5 * study.heap
+    model = _box((study.thickness, height), (0.0, 0.5 * height - study.depth), sand, variant)
+    (dragged,) = _play(model, [(study.speed, 0.0, study.travel / study.speed)])
+    return {"travel_m": dragged.travel[:, 0].tolist(), "drag": (-dragged.force[:, 0] / ZETA).tolist()}
+
+
+def wheel(variant: str) -> dict[str, Any]:
+    """Drive the wheel of the continuum's study twice over the same sand: slip and sinkage of both passes."""
+    study = Rut()
+    share = WIDTH / study.breadth
+    parameters = dataclasses.replace(
+        GROUSER_WHEEL,
+        width=WIDTH,
+        vertical_mass=share * study.mass_z,
+        horizontal_mass=share * study.mass_x,
+        forward_force=share * study.push,
+        gravity=study.gravity,
+    )
+    spec = build_wheel(parameters, study.rpm)
+    options = {"meshes": "exact", "max_edge": 2 * WIDTH, "draw": False, **VARIANTS[variant]}
+    add_sand(spec, POPPY, LAW, bodies=[WHEEL], terrain=0.0, **options)
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    passes = []
+    for _ in range(2):
+        _put_back(model, data, study.rest)
+        passes.append(_drive(model, data, study.time))
+    first, second = (float(x[-1]) for x, _, _ in passes)
+    low, high = ENTRY * first, min(first - study.outer, second)
+    rim = 2.0 * np.pi * study.rpm / 60.0 * study.outer
+    slip, sunk = [], []
+    for x, v, z in passes:
+        own = (x >= low) & (x <= high)
+        slip.append(1.0 - 1.0 / float(np.mean(1.0 / v[own])) / rim)
+        sunk.append(float(z[own].mean()))
+    return {"slip": slip, "sinkage_m": sunk}
+
+
+def _put_back(model: mujoco.MjModel, data: mujoco.MjData, rest: float) -> None:
+    """Hold the wheel above the sand for a while [s], and put it where the keyframe has it, sand as it is."""
+    for _ in range(round(rest / model.opt.timestep)):
+        data.qpos[:], data.qvel[:], data.ctrl[:] = (0.0, 1.0, 0.0), 0.0, 0.0
+        mujoco.mj_step(model, data)
+    key = model.key("start")
+    data.qpos[:], data.qvel[:], data.ctrl[:] = key.qpos, key.qvel, key.ctrl
+
+
+def _drive(model: mujoco.MjModel, data: mujoco.MjData, duration: float) -> tuple[Array, Array, Array]:
+    """Distance [m], speed [m/s] and sinkage of the outer circle below level ground [m] over a duration [s]."""
+    rows = []
+    for _ in range(round(duration / model.opt.timestep)):
+        mujoco.mj_step(model, data)
+        rows.append((data.qpos[0], data.qvel[0], -data.qpos[1]))
+    x, v, z = np.array(rows).T
+    return x, v, z
+
+
+def rows(measured: Measured) -> list[Row]:
+    """The rows of foot, blade and wheel, without ruts and, where the sand can remember, with them."""
+    found = outcome(measured, "ruts")
+    if not found:
+        return []
+    table = []
+    for variant in VARIANTS:
+        table += _foot_rows(found["footprint"], measured[f"foot/{variant}"], variant)
+        table += _blade_rows(found["blade"], measured[f"blade/{variant}"], variant)
+        table += _wheel_rows(found["rut"], measured[f"wheel/{variant}"], variant)
+    return [*table, *_own_rows(found)]
+
+
+def _row(what: str, got: float, expected: float, within: float, variant: str, unit: str = "-") -> Row:
+    """A row that is judged where the sand remembers, and only shown where it does not."""
+    within = within if VARIANTS[variant] else math.inf
+    return near(f"{variant}: {what}", got, expected, within, "our continuum", unit=unit)
+
+
+def ratios(pushes: dict[str, Any], depths: Array) -> Array:
+    """The second push's force over the first's at depths below the undisturbed surface [-]."""
+    forces = [np.interp(depths, pushes[name]["depth_m"], pushes[name]["force"]) for name in ("second", "first")]
+    found: Array = forces[0] / forces[1]
+    return found
+
+
+def _foot_rows(runs: list[dict[str, Any]], played: dict[str, Any], variant: str) -> list[Row]:
+    if not runs:
+        return []
+    fine = runs[-1]
+    depths = np.array(fine["depths_m"])
+    return [
+        _row(f"footprint, {1e3 * z:.0f} mm deep: second push over first", float(got), one, BOUNDS["ratio"], variant)
+        for z, got, one in zip(depths, ratios(played, depths), fine["ratios"], strict=True)
+    ]
+
+
+def _blade_rows(runs: list[dict[str, Any]], played: dict[str, Any], variant: str) -> list[Row]:
+    if not runs:
+        return []
+    fine, table = runs[-1], []
+    travel, drag = np.array(played["travel_m"]), np.array(played["drag"])
+    start = float(drag[travel <= 0.05 * travel[-1]].mean())
+    for share, way, force in zip(SHARES, fine["travel_m"], fine["drag_N_m"], strict=True):
+        own = (travel >= (share - 0.05) * travel[-1]) & (travel <= share * travel[-1])
+        expected = force / fine["start_N_m"]
+        what = f"blade after {1e3 * way:.0f} mm: drag over that without a heap"
+        table.append(_row(what, float(drag[own].mean()) / start, expected, BOUNDS["ratio"] * expected, variant))
+    return table
+
+
+def _wheel_rows(runs: list[dict[str, Any]], played: dict[str, Any], variant: str) -> list[Row]:
+    if not runs:
+        return []
+    fine, table = runs[-1], []
+    for k, name in enumerate(("first", "second")):
+        slip, sunk = fine["slip"][k], 1e3 * fine["sinkage_m"][k]
+        got = 1e3 * played["sinkage_m"][k]
+        table += [
+            _row(f"wheel, {name} pass: slip", played["slip"][k], slip, BOUNDS["slip"], variant),
+            _row(f"wheel, {name} pass: sinkage", got, sunk, BOUNDS["sinkage"] * sunk, variant, "mm"),
+        ]
+    return table
+
+
+def _own_rows(found: dict[str, list[dict[str, Any]]]) -> list[Row]:
+    """What the continuum says of its surfaces, and how far its coarser cells are from its finer ones."""
+    table = []
+    for coarse, fine in zip(found["footprint"][-2:-1], found["footprint"][-1:], strict=True):
+        for what, name, factor, unit in (
+            ("print after its walls slid", "print_m", 1e3, "mm"),
+            ("rim of the print", "rim_m", 1e3, "mm"),
+            ("slope of the print's walls", "wall_deg", 1.0, "°"),
+            ("volume of the rims over the print's", "rim_over_print", 1.0, "-"),
+        ):
+            table.append(_against(what, factor * fine[name], factor * coarse[name], unit))
+    for coarse, fine in zip(found["blade"][-2:-1], found["blade"][-1:], strict=True):
+        for what, name, factor, unit in (
+            ("heap at the end of the blade's way", "heap_m", 1e3, "mm"),
+            ("slope of the heap's front", "front_deg", 1.0, "°"),
+            ("drag on the blade", "drag_N_m", 1.0, "N/m"),
+        ):
+            table.append(_against(what, factor * fine[name][-1], factor * coarse[name][-1], unit))
+    for coarse, fine in zip(found["rut"][-2:-1], found["rut"][-1:], strict=True):
+        table.append(_against("rut that the wheel leaves", 1e3 * fine["rut_m"][0], 1e3 * coarse["rut_m"][0], "mm"))
+    return table
+
+
+def _against(what: str, got: float, coarse: float, unit: str) -> Row:
+    return Row(f"continuum: {what}", got, "its coarser cells", unit=unit, expected=coarse)
+
+
+def draw(measured: Measured, figure: Any) -> None:
+    """Draw both pushes of the foot, the blade's drag, and the surfaces that foot and blade leave."""
+    axes = figure.subplots(2, 2)
+    found = outcome(measured, "ruts") or {"footprint": [], "blade": [], "rut": []}
+    _draw_foot(axes[0, 0], axes[0, 1], measured, found["footprint"][-1:])
+    _draw_blade(axes[1, 0], axes[1, 1], measured, found["blade"][-1:])
+    for axis in axes.flat:
+        axis.grid(alpha=0.3)
+        axis.legend(fontsize=7)
+    figure.suptitle("Sand that remembers: the continuum in plane strain, and 2D-RFT")
+
+
+def _draw_foot(left: Any, right: Any, measured: Measured, runs: list[dict[str, Any]]) -> None:
+    """Force over depth of both pushes, in units of the first push's last force, and the surface between them."""
+    for k, name in enumerate(("first", "second")):
+        for one in runs:
+            z, force = np.array(one[name]["depth_m"]), np.array(one[name]["force_N_m"])
+            left.plot(1e3 * z, force / one["first"]["force_N_m"][-1], color=f"C{k}", label=f"{name} push, continuum")
+        for variant, line in zip(VARIANTS, ("--", ":"), strict=False):
+            own = measured[f"foot/{variant}"]
+            force = np.array(own[name]["force"]) / own["first"]["force"][-1]
+            left.plot(1e3 * np.array(own[name]["depth_m"]), force, line, color=f"C{k}", label=f"{name}, {variant}")
+    left.set_xlim(0.0)
+    left.set_xlabel("depth below the undisturbed surface [mm]")
+    left.set_ylabel("force over the first push's last [-]")
+    for one in runs:
+        for name, said in (("pressed", "foot in"), ("left", "after lift-off"), ("end", "foot in again")):
+            right.plot(*(1e3 * np.array(one[name][key]) for key in ("x_m", "height_m")), label=f"continuum, {said}")
+    right.set_xlabel("x from the foot's middle [mm]")
+    right.set_ylabel("height of the surface [mm]")
+
+
+def _draw_blade(left: Any, right: Any, measured: Measured, runs: list[dict[str, Any]]) -> None:
+    """Drag over travel, in units of that without a heap, and the surface after parts of the way."""
+    for one in runs:
+        force = -np.array(one["force_N_m"])[:, 0] / one["start_N_m"]
+        left.plot(1e3 * np.array(one["way_m"]), force, label="continuum")
+    for variant, line in zip(VARIANTS, ("--", ":"), strict=False):
+        own = measured[f"blade/{variant}"]
+        travel, drag = np.array(own["travel_m"]), np.array(own["drag"])
+        start = drag[travel <= 0.05 * travel[-1]].mean()
+        left.plot(1e3 * travel, drag / start, line, color="k", label=variant)
+    left.set_xlabel("travel [mm]")
+    left.set_ylabel("drag over that without a heap [-]")
+    for one in runs:
+        for way, surface in zip(one["travel_m"], one["surfaces"], strict=True):
+            x, height = (1e3 * np.array(surface[key]) for key in ("x_m", "height_m"))
+            right.plot(x, height, label=f"continuum, {1e3 * way:.0f} mm")
+    right.set_xlabel("x from the blade's face [mm]")
+    right.set_ylabel("height of the surface [mm]")
