@@ -103,6 +103,8 @@ class Prints(NamedTuple):
     """The surface that the foot has left, walls slid."""
     end: Relief
     """The surface at the end of the second push."""
+    length: float
+    """Length of the foot [m]."""
 
     def ratio(self, depth: Array) -> Array:
         """Return the second push's force over the first's at depths below the undisturbed surface, (n,) [m].
@@ -122,13 +124,16 @@ class Prints(NamedTuple):
 
     @property
     def report(self) -> dict[str, Any]:
-        """The numbers as JSON has them, by name and unit; ratios are the second push's force over the first's."""
+        """The numbers as JSON has them, by name and unit; ratios are the second push's force over the first's.
+
+        The depth of the print is its mean over the middle half of the foot.
+        """
         depths = np.array(SHARES) * float(self.first[0][-1])
         return {
             "depths_m": depths.tolist(),
             "ratios": self.ratio(depths).tolist(),
             "touch_m": self.touch,
-            "print_m": -float(self.left.height.min()),
+            "print_m": -float(self.left.part(0.0, 0.25 * self.length).height.mean()),
             "rim_m": float(self.left.height.max()),
             "rim_over_print": self.left.raised / self.left.hollow,
             "wall_deg": self.left.wall_slope(),
@@ -160,7 +165,7 @@ def press(study: Footprint, watch: Watch | None = None) -> Prints:
         track = stage(sim, duration, total, watch)
         pushes.append((study.level + 0.5 * study.height - track.position[:, 0, 1], 2.0 * track.force[:, 0, 1]))
         reliefs.append(read_relief(sim, study.level))
-    return Prints(pushes[0], pushes[3], reliefs[0], reliefs[2], reliefs[3])
+    return Prints(pushes[0], pushes[3], reliefs[0], reliefs[2], reliefs[3], study.length)
 
 
 def _prepared(study: Footprint) -> Simulation:

@@ -74,7 +74,7 @@ class Relief(NamedTuple):
 def read_relief(sim: Simulation, level: float) -> Relief:
     """Return the surface of the sand as it is.
 
-    Each particle, of the volume that its mass has at the critical density, is spread over the nodes by the quadratic
+    Each particle, of the volume that it has where sand carries load, is spread over the nodes by the quadratic
     B-spline, mirrored at the walls; the surface is the highest place in each column of nodes where half of the space
     is filled, between two nodes along a straight line. Grains in the air fill less. Under a body it is the sand below.
 
@@ -85,7 +85,7 @@ def read_relief(sim: Simulation, level: float) -> Relief:
     p = sim.particles
     if p.dim != 2:
         raise MpmError("a surface over x alone is read in the plane: dim 2, not 3")
-    area = p.mass / sim.material.rho_c
+    area = p.mass / (sim.material.rho_g * np.exp(np.maximum(p.theta, p.theta_d)))
     filled = _filled(p.x / sim.dx, area / sim.dx**2, np.rint(sim.size / sim.dx).astype(int))
     top = filled.shape[1] - 1 - np.argmax(filled[:, ::-1] >= FILLED, axis=1)
     rows = np.arange(len(top))

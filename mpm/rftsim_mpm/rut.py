@@ -37,6 +37,11 @@ class Rut(Wheel):
         check_positive(self, "rest")
         check_not_negative(self, "calm")
 
+    @property
+    def quick(self) -> "Rut":
+        """The same with coarser cells, and hardly further than is compared: a look, not a measurement."""
+        return dataclasses.replace(self, dx=self.width / 1.06, duration=48.0 / abs(self.rpm) * 0.75, rest=0.1)
+
 
 class Pass(NamedTuple):
     """One pass along its way."""
