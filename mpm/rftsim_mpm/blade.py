@@ -65,7 +65,7 @@ class Blade:
 
     @property
     def dx(self) -> float:
-        """Size of a cell [m]."""
+        """Size of a cell of the grid [m]."""
         return self.depth / self.cells
 
     @property

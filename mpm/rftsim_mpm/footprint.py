@@ -66,7 +66,7 @@ class Footprint:
 
     @property
     def dx(self) -> float:
-        """Size of a cell [m]."""
+        """Size of a cell of the grid [m]."""
         return self.length / self.cells
 
     @property
@@ -86,7 +86,7 @@ class Footprint:
 
     @property
     def margin(self) -> float:
-        """Sand beside the foot [m]."""
+        """Width of the sand beside the foot [m]."""
         return self.bed * spread(self.mu_int) * self.length
 
 

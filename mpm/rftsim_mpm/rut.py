@@ -1,5 +1,6 @@
 """A driven wheel's second pass in its own rut: how deep it sinks and how much it slips, beside the first."""
 
+import copy
 import dataclasses
 import math
 from typing import Any, NamedTuple
@@ -7,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rftsim_mpm.body import Body
 from rftsim_mpm.errors import MpmError, check_not_negative, check_positive
 from rftsim_mpm.follow import stage
 from rftsim_mpm.reading import averaged
@@ -38,13 +40,18 @@ class Rut(Wheel):
         check_not_negative(self, "calm")
 
     @property
+    def whole(self) -> float:
+        """Simulated time of both passes and what follows each [s]."""
+        return 2.0 * (self.time + self.rest)
+
+    @property
     def quick(self) -> "Rut":
         """The same with coarser cells, and hardly further than is compared: a look, not a measurement."""
         return dataclasses.replace(self, dx=self.width / 1.06, duration=48.0 / abs(self.rpm) * 0.75, rest=0.1)
 
 
 class Pass(NamedTuple):
-    """One pass along its way."""
+    """Speed and sinkage of a wheel along one pass."""
 
     travel: Array
     """Distance from the start, (n,) [m]."""
@@ -71,7 +78,7 @@ class Passes(NamedTuple):
     second: Pass
     """The pass in the rut of the first."""
     left: Relief
-    """The surface that the first pass leaves; x from where the wheel began, here and in the next."""
+    """The surface that the first pass leaves; x from where the wheel began, the way that it goes, here and below."""
     end: Relief
     """The surface that the second pass leaves."""
     stretch: tuple[float, float]
@@ -101,45 +108,38 @@ def follow_rut(study: Rut, watch: Watch | None = None) -> Passes:
     """Drive the wheel over its bed twice."""
     sim = prepare(study)
     sim.calm = study.calm
-    wheel, level = sim.bodies[0], bed_depth(study)
-    start, rotation, mass = wheel.position.copy(), wheel.rotation.copy(), wheel.mass
-    entry, spin = wheel.velocity.copy(), wheel.spin.copy()
-    total = 2.0 * (study.time + study.rest)
-
-    def drive() -> Pass:
-        track = stage(sim, study.time, total, watch)
-        away = np.sign(study.rpm) * (track.position[:, 0, 0] - start[0])
-        sunk = level + study.outer - track.position[:, 0, 1]
-        return Pass(away, np.sign(study.rpm) * track.velocity[:, 0, 0], sunk)
-
-    def surface() -> Relief:
-        relief = read_relief(sim, level)
-        return relief._replace(x=relief.x - start[0])
-
-    first = drive()
+    began = copy.copy(sim.bodies[0])
+    first = _drive(sim, study, began, watch)
     if not first.travel[-1] > FEWEST_RADII * study.outer:
         raise MpmError(
             f"the wheel came {first.travel[-1]:.2g} m far; two passes are compared from {FEWEST_RADII:g} radii of "
             f"{study.outer:g} m on: a longer duration, or another rpm"
         )
-    _hold(sim, study)
-    stage(sim, study.rest, total, watch)
-    left = surface()
-    wheel.position = np.array([start[0], level + _rest_height(left, study.outer)])
-    wheel.rotation, wheel.velocity, wheel.spin, wheel.mass = rotation, entry, spin, mass
-    second = drive()
-    _hold(sim, study)
-    stage(sim, study.rest, total, watch)
+    left = _left(sim, study, began, watch)
+    began.position[1] = bed_depth(study) + _rest_height(left, study.outer)
+    sim.bodies[0] = copy.copy(began)
+    second = _drive(sim, study, began, watch)
+    end = _left(sim, study, began, watch)
     far = min(float(first.travel[-1]) - study.outer, float(second.travel[-1]))
-    stretch = ENTRY * float(first.travel[-1]), far
-    return Passes(first, second, left, surface(), stretch, abs(omega_of(study)) * study.outer)
+    return Passes(first, second, left, end, (ENTRY * float(first.travel[-1]), far), abs(omega_of(study)) * study.outer)
 
 
-def _hold(sim: Simulation, study: Rut) -> None:
-    """Take the wheel up, clear of all sand, and hold it there."""
+def _drive(sim: Simulation, study: Rut, began: Body, watch: Watch | None) -> Pass:
+    """Let the wheel roll for the study's time, from where it is."""
+    track, way = stage(sim, study.time, study.whole, watch), np.sign(study.rpm)
+    away = way * (track.position[:, 0, 0] - began.position[0])
+    sunk = bed_depth(study) + study.outer - track.position[:, 0, 1]
+    return Pass(away, way * track.velocity[:, 0, 0], sunk)
+
+
+def _left(sim: Simulation, study: Rut, began: Body, watch: Watch | None) -> Relief:
+    """Take the wheel up, clear of all sand, hold it there until the walls have slid, and read the surface."""
     wheel = sim.bodies[0]
     wheel.position = np.array([wheel.position[0], sim.size[1] - study.outer - 2.0 * study.dx])
     wheel.velocity, wheel.spin, wheel.mass = np.zeros(2), np.zeros(1), math.inf
+    stage(sim, study.rest, study.whole, watch)
+    relief, way = read_relief(sim, bed_depth(study)), 1 if study.rpm > 0.0 else -1
+    return relief._replace(x=(way * (relief.x - began.position[0]))[::way], height=relief.height[::way])
 
 
 def _rest_height(relief: Relief, radius: float) -> float:

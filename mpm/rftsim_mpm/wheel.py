@@ -173,7 +173,7 @@ def prepare(study: Wheel) -> Simulation:
 
 
 def omega_of(study: Wheel) -> float:
-    """Spin of the wheel [rad/s]."""
+    """Return the spin of the wheel [rad/s]."""
     return study.rpm * 2.0 * math.pi / 60.0
 
 
