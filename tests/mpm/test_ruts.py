@@ -78,6 +78,16 @@ def test_a_wheel_that_comes_nowhere_is_refused():
         follow_rut(Rut(dx=0.0055, duration=0.01))
 
 
+def test_a_wheel_rolls_either_way():
+    """A wheel that spins the other way makes the mirror image of both passes and of both surfaces."""
+    small = Rut(rpm=120.0, duration=0.25, radius=0.03, grousers=8, height=0.006, dx=0.0056, rest=0.02)
+    there, back = follow_rut(small), follow_rut(dataclasses.replace(small, rpm=-120.0))
+    for a, b in ((there.first, back.first), (there.second, back.second)):
+        np.testing.assert_allclose(b.travel, a.travel, rtol=1e-5, atol=1e-8)
+        np.testing.assert_allclose(b.sinkage, a.sinkage, rtol=1e-5)
+    np.testing.assert_allclose(back.end.at(there.end.x), there.end.height, atol=1e-3 * small.dx)
+
+
 @pytest.fixture(scope="module")
 def shipped():
     found = {}
