@@ -52,8 +52,8 @@ def find_models() -> Iterator[Path]:
                 yield from sorted(Path(place).glob(pattern))
 
 
-def try_model(path: Path) -> dict[str, Any]:
-    """Load one model bare and on sand, let it settle, and move it."""
+def try_model(path: Path, **options: Any) -> dict[str, Any]:
+    """Load one model bare and on sand, with options of `rftsim.load`, let it settle, and move it."""
     row: dict[str, Any] = {"name": "/".join(path.parts[-2:]), "path": str(path)}
     try:
         bare = mujoco.MjModel.from_xml_path(str(path))
@@ -62,12 +62,13 @@ def try_model(path: Path) -> dict[str, Any]:
     if not bare.nv or not (bare.body_weldid[bare.geom_bodyid] != 0).any():
         return row | {"skipped": "nothing moves"}
     import rftsim
+    from rftsim.model.ground import ground
 
     started = time.perf_counter()
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
         try:
-            model = rftsim.load(path)
+            model = rftsim.load(path, **options)
         except rftsim.RftsimError as error:
             return row | {"error": str(error)[:200]}
     row["load_s"] = time.perf_counter() - started
@@ -75,27 +76,30 @@ def try_model(path: Path) -> dict[str, Any]:
     row["warnings"] = [str(one.message) for one in told if one.category is rftsim.RftsimWarning]
     bed = rftsim.instances(model)[0]
     row["bodies"], row["elements"] = len(bed.bodies), int(sum(s.size // 7 for s in bed.bodies.values()))
-    row["height"] = float(bed.bed.offset / bed.bed.up[2])
+    row["height"] = float(ground(model, mujoco.MjData(model)).height_at(0.0, 0.0))
     return row | _run(bare, model)
 
 
 def _run(bare: mujoco.MjModel, model: mujoco.MjModel) -> dict[str, Any]:
     """Settle and move a model on sand, and its bare twin as often."""
     from rftsim import instances, work, wrenches
+    from rftsim.model.ground import ground
     from rftsim.model.standing import sinkage, standing
+    from rftsim.run.robot import against_gravity
 
     row: dict[str, Any] = {}
     data, other = _start(model), _start(bare)
     found = standing(model, data)
     data.qpos[:] = found.qpos
-    weight = sum(tree.weight for tree in found.trees)
+    own = np.concatenate([np.zeros(0, dtype=int), *(tree.bodies for tree in found.trees)])
+    weight = float((model.body_mass * (1.0 - model.body_gravcomp))[own].sum() * np.linalg.norm(model.opt.gravity))
     n = max(round(SETTLING / model.opt.timestep), 1)
     mujoco.mj_step(model, data, nstep=n - n // 10)
     row["rest_us"] = _timed(model, data, n // 10, None)
     row["speed"] = float(np.abs(data.qvel).max())
     (bed,) = instances(model)
-    row["carried"] = float(wrenches(model, data).force.sum(axis=0) @ bed.bed.up / weight) if weight else None
-    row["sinkage"] = max(sinkage(bed.packed, s, data.xpos[b], data.xmat[b]) for b, s in bed.bodies.items())
+    row["carried"] = against_gravity(model, wrenches(model, data).force.sum(axis=0)) / weight if weight else None
+    row["sinkage"] = max(sinkage(ground(model, data), s, data.xpos[b], data.xmat[b]) for b, s in bed.bodies.items())
     mujoco.mj_step(bare, other, nstep=n - n // 10)
     row["bare_rest_us"] = _timed(bare, other, n // 10, None)
     moves = max(round(MOVING / model.opt.timestep), 1)

@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 import rftsim
 from rftsim.view import record, recording_file
-from rftsim.view.shapes import traction_colours
+from rftsim.view.colours import traction_colours
 
 rerun_chunk = pytest.importorskip("rerun.chunk")
 

@@ -48,7 +48,7 @@ VALIDATE = "validate plates --memory memory"
 COMMANDS = (
     "force ball.stl --sand sand.toml --position 0 0 -0.1 --velocity 0.1 0 -1 --scale 1 --law rft3d",
     "force ball.obj --sand poppy-seeds --velocity 0 0 -1 --angular-velocity 0 1 0 --plane 0 1 0 --law drft2d --json",
-    "run model.xml --duration 0.02 --timestep 0.002 --surface 0 --reduction 0.05 --tolerance 0.01 --iterations 8",
+    "run model.xml --duration 0.02 --timestep 0.002 --terrain 0 --reduction 0.05 --tolerance 0.01 --iterations 8",
     "run grouser-wheel --set rpm=60 --duration 0.02 --plot wheel.png",
     "run intruder --set mesh=ball.stl scale=1 motion=drag --duration 0.01 --record drag.rrd",
     "inspect model.xml --speed 0.3 --reduction 0.1 --bodies b --geoms all",

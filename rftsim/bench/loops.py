@@ -4,21 +4,21 @@ import numba  # not `from`: what measures the package is not part of what its ma
 
 from rftsim.law import evaluate as laws
 from rftsim.law import exports, sums
-from rftsim.law.body import bed_at, body_at, header_at, medium_at
-from rftsim.law.frame import level_frame
+from rftsim.law.body import body_at, frame_over, header_at, medium_of
+from rftsim.law.grounds import plane
 from rftsim.law.laws import CUBIC
 from rftsim.law.leading import SHARP, Edge
 
 laws.linked()("rftsim_wrench")  # by which name compiled code finds it from here on
-_sums = sums.sums(CUBIC)
+_sums = sums.sums(CUBIC, plane(CUBIC))
 
 
 @numba.njit
-def evaluate(bed, surface, position, turn, velocity, omega, out, count):
+def evaluate(sand, surface, position, turn, velocity, omega, out, count):
     """The wrench on a body, evaluated so many times, into out (6,)."""
     for _ in range(count):
         exports.wrench(
-            bed.ctypes.data,
+            sand.ctypes.data,
             surface.ctypes.data,
             position.ctypes.data,
             turn.ctypes.data,
@@ -29,11 +29,11 @@ def evaluate(bed, surface, position, turn, velocity, omega, out, count):
 
 
 @numba.njit(error_model="numpy")
-def law_loop(bed, surface, position, turn, velocity, omega):
+def law_loop(sand, surface, position, turn, velocity, omega):
     """The loop of 3D-RFT alone, whose instructions are counted."""
     at, edge = surface.ctypes.data, Edge(header_at(surface.ctypes.data).edge_on, SHARP)
-    frame = level_frame(bed_at(bed.ctypes.data), position, turn, velocity, omega)
-    return _sums(body_at(at), frame, medium_at(bed.ctypes.data), edge)
+    frame = frame_over(sand.ctypes.data, at, position, turn, velocity, omega, 0.0)
+    return _sums(body_at(at), frame, sand.ctypes.data, medium_of(sand.ctypes.data), edge)
 
 
 @numba.njit(fastmath={"contract"}, forceinline=True)

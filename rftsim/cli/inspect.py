@@ -11,7 +11,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from rftsim.cli.output import print_json, print_line
-from rftsim.cli.scene import Scene
+from rftsim.cli.scene import Scene, surface_report
 from rftsim.errors import RftsimError
 from rftsim.model.add_sand import REDUCTION, Bed
 from rftsim.model.poses import posed
@@ -91,7 +91,7 @@ def _report(found: _Inspected) -> dict[str, Any]:
         "law": bed.law.name,
         "law_says": bed.law.says,
         "sand": dataclasses.asdict(bed.sand),
-        "surface": dataclasses.asdict(bed.terrain),
+        "surface": surface_report(bed.terrain),
         "timestep_s": float(model.opt.timestep),
         "tolerance": float(solution.tolerance),
         "iterations": int(solution.iterations),

@@ -15,7 +15,7 @@ from rftsim.cli.output import make_table, print_json, print_written
 from rftsim.cli.settings import Settings, read_settings
 from rftsim.errors import RftsimError
 from rftsim.files import check_writable, replacing
-from rftsim.view.render import SIZE
+from rftsim.view.cameras import SIZE
 
 if TYPE_CHECKING:
     from rftsim_envs.env import SandEnv

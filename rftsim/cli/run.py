@@ -11,13 +11,17 @@ import mujoco
 from rich.console import Console
 from rich.progress import Progress
 
+from rftsim.cli.extra import needing
 from rftsim.cli.output import is_quiet, print_doubts, print_json, print_written
 from rftsim.cli.results import draw
 from rftsim.cli.scene import Scene, print_robot, robot_report
-from rftsim.files import check_writable
+from rftsim.files import check_writable, replacing
 from rftsim.run.run import SAMPLES, run
 from rftsim.run.run import Run as Finished
 from rftsim.run.scenes import Staged
+from rftsim.view.cameras import SIZE, Follower
+from rftsim.view.drawing import Shown
+from rftsim.view.film import filming
 from rftsim.view.history import plot_history
 from rftsim.view.render import Pictures, save_picture
 
@@ -42,7 +46,15 @@ class Run(Scene):
     plot: Path | None = None
     """Draw the run, .png, .pdf or .svg."""
     picture: Path | None = None
-    """Render the last moment with the sand's forces and tractions as arrows, .png."""
+    """Render the last moment, with the sand's forces as arrows, .png."""
+    video: Path | None = None
+    """Film the run, with the sand's forces as arrows, .mp4."""
+    arrows: bool = True
+    """Show the sand's force on each body in pictures and films."""
+    tractions: bool = False
+    """Show the sand's tractions in pictures and films, one arrow for each patch of a body, and their scale."""
+    buried: bool = False
+    """Let what is buried show through the sand in pictures and films."""
     settle: bool = True
     """Start a model file where it stands: what floats is lowered or raised until the sand carries it."""
     json: bool = False
@@ -56,10 +68,17 @@ class Run(Scene):
             check_writable(self.plot, ".png", ".pdf", ".svg")
         if self.picture:
             check_writable(self.picture, ".png")
+        if self.video:
+            check_writable(self.video, ".mp4")
+            with needing("video"):
+                import av  # noqa: F401
         staged = self._stage()
+        shown = Shown(self.arrows, self.tractions, self.buried)
         with contextlib.ExitStack() as stack:
-            pictures = stack.enter_context(Pictures(staged.model)) if self.picture else None  # fails now, or not at all
-            finished = self._simulate(staged)
+            pictures = None
+            if self.picture or self.video:
+                pictures = stack.enter_context(Pictures(staged.model, shown=shown))  # fails now, or not at all
+            finished = self._simulate(staged, pictures)
             draw(self.plot, plot_history, finished.history, f"{self.scene}, {staged.bed.law.name}")
             draw(self.picture, save_picture, pictures, finished.last)
         if self.json:
@@ -74,7 +93,7 @@ class Run(Scene):
             print_robot(console, finished.robot)
         console.print(f"{finished.realtime_factor:.3g} times real time")
         print_doubts(console, finished.doubts)
-        print_written(console, self.plot, self.picture, self.record)
+        print_written(console, self.plot, self.picture, self.video, self.record)
 
     def _stage(self) -> Staged:
         return self.staged(
@@ -102,7 +121,7 @@ class Run(Scene):
             "warnings": [*warnings, *finished.doubts],
         }
 
-    def _simulate(self, staged: Staged) -> Finished:
+    def _simulate(self, staged: Staged, pictures: Pictures | None) -> Finished:
         samples = min(SAMPLES, math.ceil(staged.duration / staged.model.opt.timestep))
         with Progress(console=Console(stderr=True), transient=True, disable=is_quiet(self.json)) as progress:
             task = progress.add_task(self.scene, total=samples)
@@ -112,10 +131,16 @@ class Run(Scene):
                     from rftsim.view.record import Recorder  # rerun is an extra
 
                     recorder = stack.enter_context(Recorder(staged.model, self.record))
+                show = None
+                if self.video is not None:
+                    show = stack.enter_context(filming(stack.enter_context(replacing(self.video)), *SIZE))
+                follower = Follower(staged.model)
 
                 def observe(data: mujoco.MjData) -> None:
                     progress.advance(task)
                     if recorder is not None:
                         recorder.log(data)
+                    if show is not None and pictures is not None:
+                        show(lambda: pictures.take(data, follower.at(data)), data.time)
 
                 return run(staged, observe)

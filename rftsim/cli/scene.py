@@ -1,6 +1,7 @@
 """Options by which several commands take a scene: a shipped one, or somebody's model file, on sand."""
 
 import dataclasses
+import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -14,6 +15,8 @@ from rftsim.errors import RftsimError
 from rftsim.model.geometry import Geoms, Meshes
 from rftsim.run.robot import Robot
 from rftsim.run.scenes import SCENES, Staged, Start, stage
+from rftsim.sand.free_surface import FreeSurface
+from rftsim.sand.terrain import Terrain
 
 
 @dataclasses.dataclass(frozen=True)
@@ -34,8 +37,10 @@ class Scene:
     """Geoms that bound a body: those that can collide, or, where a body has none of these, all that it has."""
     meshes: Meshes | None = None
     """How meshes of model files are felt: hull, as MuJoCo collides with them, or exact, as they are where closed."""
-    surface: float | None = None
-    """Height of the sand's surface [m]; by default that of the floor, whose place it takes."""
+    terrain: str | None = None
+    """The sand's surface: a height [m]; slope=DEGREES[,heading=DEGREES]; dunes[,amplitude=M,wavelength=M,seed=N];
+    FILE.png,size=XxY,high=M[,low=M]; a .npy, .npz or .csv of heights with spacing=M; or the name of a height field geom
+    of the model. By default that of the floor, whose place it takes."""
     keyframe: str | None = None
     """Name or number of the keyframe in which a model file starts; by default the first."""
     keep_floor: bool = False
@@ -60,14 +65,13 @@ class Scene:
         options.setdefault("reduction", self.reduction)
         if self.bodies is not None:
             options["bodies"] = [name.strip() for name in self.bodies.split(",")]
-        if self.surface is not None:
-            options["terrain"] = self.surface
         return stage(
             self.scene,
             sand=self.sand,
             law=self.law,
             settings=read_settings(self.set),
             start=Start(self.keyframe, settle),
+            terrain=self.terrain,
             geoms=self.geoms,
             meshes=self.meshes,
             keep_floor=self.keep_floor,
@@ -75,6 +79,22 @@ class Scene:
             iterations=self.iterations,
             **options,
         )
+
+
+def surface_report(terrain: FreeSurface | Terrain) -> dict[str, Any]:
+    """The measures of the sand's surface, as JSON has them."""
+    if isinstance(terrain, FreeSurface):
+        return dataclasses.asdict(terrain)
+    return {
+        "rows": terrain.heights.shape[0],
+        "columns": terrain.heights.shape[1],
+        "spacing_m": terrain.spacing,
+        "origin_m": terrain.origin,
+        "repeat": terrain.repeat,
+        "lowest_m": float(terrain.heights.min()),
+        "highest_m": float(terrain.heights.max()),
+        "steepest_deg": math.degrees(terrain.steepest),
+    }
 
 
 def robot_report(robot: Robot) -> dict[str, Any]:

@@ -1,8 +1,9 @@
 """A plugin instance: which bodies feel its sand, where their numbers lie in the model, and what it remembers.
 
 The numbers are found by name. A numeric is a body's surface, or a bed's parameters, where its name without the marker
-is the body's, or the instance's, name; so MJCF attachment may put any prefix and suffix around both. They are checked
-when the block is made, see `checks`; where they lie and how many they are is kept, and not read from the model again.
+is the body's, or the instance's, name; so are those of its terrain; so MJCF attachment may put any prefix and suffix
+around both. They are checked when the block is made, see `checks`; where they lie and how many they are is kept, and
+not read from the model again.
 
 What belongs to an mjData (`plugin_data` is its number in the registry) is one block: a record of BLOCK_HEAD, one of
 MEMBER for each body, each body's last wrench (WRENCH numbers), what was left in MuJoCo's cfrc_ext for each (as many), a
@@ -26,14 +27,25 @@ BODY_MARKER: Final = "rftsim-body:"
 MORE_MARKER: Final = "rftsim-body-"
 """Instead of BODY_MARKER, with the numeric's number and a colon behind it, where a surface goes on."""
 SAND_MARKER: Final = "rftsim-sand:"
+TERRAIN_MARKER: Final = "rftsim-terrain:"
+MORE_TERRAIN_MARKER: Final = "rftsim-terrain-"
+"""Likewise, of a terrain that goes on."""
 BLOCK_HEAD: Final = np.dtype(
     [
         *((name, "i8") for name in ("nbody", "bed", "state", "state_size", "has_complained", "looking")),
-        ("bed_weight", "f8"),
+        *(
+            ("ruts_size", "i8"),
+            ("terrain", "i8"),
+            ("terrain_size", "i8"),
+            ("terrain_weight", "f8"),
+            ("bed_weight", "f8"),
+        ),
     ]
 )
-"""Number of bodies; the bed's place in numeric_data; address and size of the state that lasts; whether it was said that
-the numbers were changed; the body whose surface is looked at; the weight of the bed's sealed numbers, see `checks`."""
+"""Number of bodies; the bed's place in numeric_data; address and size of the state that lasts, but for ruts; whether it
+was said that the numbers were changed; the body whose surface is looked at; size of the ruts, which lie behind the
+state that lasts; the terrain's place in numeric_data and its size, zero where there is none; the weights of the
+terrain's and the bed's sealed numbers, see `checks`."""
 MEMBER: Final = np.dtype(
     [
         *((name, "i8") for name in ("body", "start", "size", "looked_at")),

@@ -14,6 +14,7 @@ from rftsim.engine import (
     making,
     offsets,
     reactions,
+    rutting,
     sensors,
     sound,
 )
@@ -75,7 +76,7 @@ def _initialise(m, d, number, wanted):
     """Make an instance's block in new data, or raise MuJoCo's error, where the model cannot have it."""
     model, data = offsets.model(), offsets.data()
     why, name = WHY.state, instance.name(model, m, number)
-    if instance.granted_state(model, m, number) == wanted:
+    if instance.granted_state(model, m, number) == wanted + instance.asked_ruts(model, m, number):
         found = make_block(m, d, number)
         why, name = found % instance.REASONS, pointer(m + model.names) + found // instance.REASONS
     if why != WHY.none:
@@ -111,8 +112,10 @@ def reset(m, state, memory, number):
 
 @entry(types.void, address, address, types.intc)
 def advance(m, d, number):
-    """End a step of an instance: keep what must last."""
-    instance.keep(offsets.model(), offsets.data(), m, d, number)
+    """End a step of an instance: keep what must last, and mark the sand that remembers."""
+    model, data = offsets.model(), offsets.data()
+    instance.keep(model, data, m, d, number)
+    rutting.remember(model, data, m, d, number)
 
 
 @entry(types.void, address, address, types.intc)
@@ -127,7 +130,7 @@ def add_to_reactions(m, d, number):
 @entry(types.intc, address, types.intc)
 def explicit_nstate(m, number):
     """The number of numbers that last from step to step."""
-    return 0
+    return instance.asked_ruts(offsets.model(), m, number)
 
 
 @entry(types.intc, address, address, types.intc)
@@ -150,7 +153,8 @@ def explicit_compute(m, d, number, capability):
 @entry(types.intc, address, types.intc)
 def implicit_nstate(m, number):
     """The number of numbers that last from step to step."""
-    return instance.wanted_state(offsets.model(), m, number)
+    model = offsets.model()
+    return instance.wanted_state(model, m, number) + instance.asked_ruts(model, m, number)
 
 
 @entry(types.intc, address, address, types.intc)

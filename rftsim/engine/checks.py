@@ -3,11 +3,17 @@
 import numpy as np
 
 from rftsim.engine import names
-from rftsim.engine.block import BODY_MARKER, CHUNK, SAND_MARKER
+from rftsim.engine.block import (
+    BODY_MARKER,
+    CHUNK,
+    MORE_MARKER,
+    MORE_TERRAIN_MARKER,
+    SAND_MARKER,
+    TERRAIN_MARKER,
+)
 from rftsim.engine.refusals import WHY
 from rftsim.engine.seal import (
     ANSWERS,
-    BED_NUMBERS,
     COUNTS,
     FACTOR,
     LARGEST,
@@ -17,6 +23,7 @@ from rftsim.engine.seal import (
     SEAL,
     SEAL_NUMBERS,
     SEALED,
+    SHAPE,
     STEP,
     TINY,
     TOLERANCES,
@@ -24,17 +31,28 @@ from rftsim.engine.seal import (
     WEIGHTS,
 )
 from rftsim.law.body import bed_at, header_at
-from rftsim.law.layout import BOX_NUMBERS, COLUMNS, HEADER_NUMBERS, WRENCH, packed_size
+from rftsim.law.field import terrain_at
+from rftsim.law.layout import (
+    BED_NUMBERS,
+    BOX_NUMBERS,
+    COLUMNS,
+    HEADER_NUMBERS,
+    TERRAIN_NUMBERS,
+    WRENCH,
+    packed_size,
+    terrain_size,
+)
 from rftsim.machine.compiling import exact, inline, loop
 from rftsim.machine.memory import doubles, int32s, pointer, uint64s
 from rftsim.machine.records import record_at
 
-_BODY, _SAND = BODY_MARKER.encode(), SAND_MARKER.encode()
+_BODY, _SAND, _TERRAIN = BODY_MARKER.encode(), SAND_MARKER.encode(), TERRAIN_MARKER.encode()
+_MORE, _MORE_TERRAIN = MORE_MARKER.encode(), MORE_TERRAIN_MARKER.encode()
 _STEP, _FACTOR = np.uint64(STEP), np.uint64(FACTOR)
 _HALF, _PART, _PIECE = np.uint64(32), np.uint64(29), np.uint64(16)
 _MASK, _NOTHING = np.uint64(0xFFFF), np.uint64(0)
 _FIRST, _LAST = PARAMETERS[0], PARAMETERS[-1] + 1
-_SEALED, _REST = len(SEALED), len(REST)
+_SEALED, _REST, _SHAPE = len(SEALED), len(REST), len(SHAPE)
 _SMALLEST = HEADER_NUMBERS + COLUMNS + BOX_NUMBERS
 _UNIT = 1e-5
 """How far the square of a unit vector may be from one: MuJoCo prints six digits."""
@@ -170,12 +188,12 @@ def _is_whole(model, m, numeric, start, total):
 
 
 @exact
-def _goes_on(model, m, owner, numeric, at, total):
-    """Whether those numerics have the names of a surface whose marker stands at a place of its owner's name."""
+def _goes_on(model, m, more, owner, numeric, at, total):
+    """Whether those numerics have the names of what goes on so, and whose marker stands at a place of an owner's."""
     text, count = names.text(model, m), pointer(m + model.nnumeric)
     for k in range(1, (total + CHUNK - 1) // CHUNK):
         name = names.start_of(model, m, model.name_numericadr, count, numeric + k)
-        if not names.goes_on(text, name, owner, at, k):
+        if not names.goes_on(text, name, more, owner, at, k):
             return False
     return True
 
@@ -209,9 +227,40 @@ def check_surface(model, m, owner, bed, bed_name):
     while at >= 0:
         whole, last = _add_text(digest, key, text, owner + at, _length(seal))
         whole, _ = _add_text(whole, last, text, bed_name, of_bed)
-        if _is_sealed(seal, whole) and _goes_on(model, m, owner, numeric, at, total):
+        if _is_sealed(seal, whole) and _goes_on(model, m, _MORE, owner, numeric, at, total):
             return start, size
         at = names.marked(text, name, _BODY, owner, at + 1)
+    return -1, 0
+
+
+@exact
+def check_terrain(model, m, owner):
+    """Where the terrain of the bed whose instance's name is at `owner` lies in numeric_data, and its size; else -1."""
+    numeric, name, at = find(model, m, _TERRAIN, owner)
+    start, size = _range(model, m, numeric)
+    if size < TERRAIN_NUMBERS:
+        return -1, 0
+    terrain, text, end = (
+        pointer(m + model.numeric_data) + 8 * start,
+        names.text(model, m),
+        pointer(m + model.nnumericdata),
+    )
+    head = terrain_at(terrain)
+    if not (2.0 <= head.rows <= end and 2.0 <= head.columns <= end and head.rows * head.columns <= end):
+        return -1, 0
+    size = terrain_size(head)
+    total = size + SEAL_NUMBERS
+    if not _is_whole(model, m, numeric, start, total) or not are_numbers(terrain, size):
+        return -1, 0
+    seal, values, words = _seal_at(terrain + 8 * size), doubles(terrain, size), uint64s(terrain, size)
+    digest, key = _NOTHING, _NOTHING
+    for k in range(_SHAPE):
+        digest, key = _add(digest, key, _word(values, words, SHAPE[k]))
+    while at >= 0:
+        whole, _ = _add_text(digest, key, text, owner + at, _length(seal))
+        if _is_sealed(seal, whole) and _goes_on(model, m, _MORE_TERRAIN, owner, numeric, at, total):
+            return start, size
+        at = names.marked(text, name, _TERRAIN, owner, at + 1)
     return -1, 0
 
 
@@ -262,6 +311,15 @@ def weigh(address, size):
     for k in range(size - WEIGHED * whole):
         part += numbers[WEIGHED * whole + k] * WEIGHTS[k]
     return total + (1.0 + turn) * part
+
+
+@exact
+def weigh_shape(terrain):
+    """The same of those numbers of the terrain at an address that nobody may change."""
+    total, numbers = 0.0, doubles(terrain, TERRAIN_NUMBERS)
+    for k in range(_SHAPE):
+        total += numbers[SHAPE[k]] * WEIGHTS[k]
+    return total
 
 
 @exact

@@ -1,10 +1,14 @@
 """The sand's force at the velocity of the moment."""
 
+from typing import Final
+
 from rftsim.engine import bodies, instance
 from rftsim.engine.refusals import WHY
 from rftsim.law import exports
 from rftsim.machine.compiling import inline
 from rftsim.machine.memory import doubles, pointer, stack_doubles
+
+_SAND: Final = instance.SAND_NUMBERS
 
 
 @inline
@@ -15,7 +19,8 @@ def press(model, data, m, d, number, is_for_implicit):
     if address == 0 or instance.is_sound(m, address, size) == 0:
         instance.spoil(model, data, m, d, number, address, WHY.changed)
         return
-    sand = instance.bed(model, m, address)
+    sand = stack_doubles(_SAND)
+    instance.fill_sand(model, m, address, sand)
     t = bodies.tree(model, data, m, d)
     force = doubles(pointer(d + data.qfrc_passive), pointer(m + model.nv))
     v, w = doubles(stack_doubles(3), 3), doubles(stack_doubles(3), 3)

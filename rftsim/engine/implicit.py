@@ -11,7 +11,7 @@ from rftsim.engine import bodies, constraints, external, instance, islands
 from rftsim.engine.layout import CONSTANTS
 from rftsim.engine.refusals import WHY
 from rftsim.law import exports
-from rftsim.law.body import bed_at, header_at
+from rftsim.law.body import bed_of, header_at
 from rftsim.machine.compiling import inline
 from rftsim.machine.memory import doubles, int32s, pointer, release, stack_doubles, take
 from rftsim.solver import equation, linear_algebra, sparse, state, time_step
@@ -23,13 +23,14 @@ _UNDAMPED: Final = CONSTANTS["no_euler_damping"] | CONSTANTS["no_damping"]
 _EULER: Final = CONSTANTS["euler"]
 _IMPLICIT: Final = CONSTANTS["implicit"]
 _ISLANDS: Final = islands.TABLE
+_SAND: Final = instance.SAND_NUMBERS
 _WORK: Final = len(WORK.names or ())
 
 
 @inline
-def _find_near(model, m, t, address, old, out):
+def _find_near(model, m, t, address, sand, old, out):
     """Fill out with the places of the bodies that can be in the sand within the step, or last had their step split."""
-    sand, found = instance.bed(model, m, address), 0
+    found = 0
     nv, h = pointer(m + model.nv), doubles(m + model.opt_timestep, 1)[0]
     twist = doubles(stack_doubles(6), 6)
     for k in range(instance.head(address).nbody):
@@ -223,7 +224,7 @@ def _hand_over(model, data, m, d, address, new, i, island, p):
 
 
 @inline
-def _solve(model, data, contact, m, d, t, address, old, new, i, island):
+def _solve(model, data, contact, m, d, t, address, sand, old, new, i, island):
     """Solve for the sand's force on one island; whether there was memory to do so."""
     p, work = stack_doubles(TABLE), doubles(stack_doubles(_WORK), _WORK)
     linear_algebra.clear(work)
@@ -233,8 +234,8 @@ def _solve(model, data, contact, m, d, t, address, old, new, i, island):
         return False
     equation.place(p, memory)
     head, numbers = equation.head(p), equation.numbers(p)
-    head.sand, head.work = instance.bed(model, m, address), work.ctypes.data
-    bed = bed_at(head.sand)
+    head.sand, head.work = sand, work.ctypes.data
+    bed = bed_of(sand)
     numbers.tolerance, numbers.iterations = bed.tolerance, bed.iterations
     numbers.drift = numbers.parts = 0.0
     numbers.timestep, numbers.started = doubles(m + model.opt_timestep, 1)[0], state.started(old)[0]
@@ -272,14 +273,16 @@ def press(model, data, contact, m, d, number):
         instance.spoil(model, data, m, d, number, address, WHY.exhausted)
         return
     islands.begin(i, memory)
-    found = _find_near(model, m, t, address, old, islands.near(i))
+    sand = stack_doubles(_SAND)
+    instance.fill_sand(model, m, address, sand)
+    found = _find_near(model, m, t, address, sand, old, islands.near(i))
     islands.head(i).nbody = found
     if found > 0:
         _sort(model, data, m, d, t, address, i)
         _compute_drives(model, data, m, d, t, i)
         for island in range(islands.head(i).ntree):
             if islands.body_count(i)[island] > 0 and not _solve(
-                model, data, contact, m, d, t, address, old, new.ctypes.data, i, island
+                model, data, contact, m, d, t, address, sand, old, new.ctypes.data, i, island
             ):
                 instance.spoil(model, data, m, d, number, address, WHY.exhausted)
     release(memory)

@@ -5,16 +5,22 @@ from numba import types
 
 from rftsim.engine import block, external, names
 from rftsim.engine.refusals import WHY
-from rftsim.law.layout import WRENCH, numbers_in
+from rftsim.law import field as fields
+from rftsim.law.layout import RUTS_NUMBERS, SAND, WRENCH, numbers_in
 from rftsim.machine import claims
 from rftsim.machine.compiling import exact, inline
-from rftsim.machine.memory import doubles, int32s, int64s, pointer
+from rftsim.machine.memory import bytes_at, doubles, int32s, int64s, pointer
 from rftsim.machine.records import record_at
+from rftsim.sand.ruts import SIDES
 from rftsim.solver import state
 
 _MEMBER = block.MEMBER.itemsize
 _HEAD = block.BLOCK_HEAD.itemsize
 _COUNTERS = numbers_in(block.COUNTERS)
+MOST_RUTS = RUTS_NUMBERS + 2 * SIDES[1] ** 2
+_ZERO, _NINE = ord("0"), ord("9")
+SAND_NUMBERS = numbers_in(SAND)
+"""Numbers of the record SAND."""
 
 REASONS = 16
 """What is wrong, of fewer reasons than these, and where the name of that stands, are handed over as one number."""
@@ -40,8 +46,19 @@ def count_bodies(model, m, instance):
 
 
 @exact
+def asked_ruts(model, m, instance):
+    """Numbers of plugin_state that an instance's attribute asks for its ruts; more than MOST_RUTS are none."""
+    end, total = pointer(m + model.npluginattr), 0
+    text = bytes_at(pointer(m + model.plugin_attr), end)
+    at = int32s(pointer(m + model.plugin_attradr), pointer(m + model.nplugin))[instance]
+    while 0 <= at < end and _ZERO <= text[at] <= _NINE and total <= MOST_RUTS:
+        total, at = 10 * total + (text[at] - _ZERO), at + 1
+    return total if total <= MOST_RUTS else 0
+
+
+@exact
 def wanted_state(model, m, instance):
-    """Numbers of plugin_state that the implicit force wants."""
+    """Numbers of plugin_state that the implicit force wants, beside ruts."""
     return state.state_size(count_bodies(model, m, instance), pointer(m + model.nv))
 
 
@@ -127,6 +144,27 @@ def spoil(model, data, m, d, instance, address, why):
     if head(address).has_complained == 0:
         head(address).has_complained = 1
         external.warn(why, name(model, m, instance))
+
+
+@exact
+def terrain(model, m, address):
+    """The address of the terrain of a block, or zero where its bed is a plane."""
+    known = head(address)
+    return pointer(m + model.numeric_data) + 8 * known.terrain if known.terrain_size > 0 else 0
+
+
+@exact
+def ruts(address):
+    """The address of the ruts of a block, behind the state that lasts, or zero where its bed remembers nothing."""
+    known = head(address)
+    return known.state + 8 * known.state_size if known.ruts_size > 0 else 0
+
+
+@exact
+def fill_sand(model, m, address, out):
+    """Fill the record SAND at an address with where the sand of a block lies now."""
+    sand = fields.sand_at(out)
+    sand.bed, sand.terrain, sand.ruts = bed(model, m, address), terrain(model, m, address), ruts(address)
 
 
 @exact

@@ -87,6 +87,7 @@ class Model(NamedTuple):
     nsensor: int
     nsensordata: int
     nplugin: int
+    npluginattr: int
     npluginstate: int
     body_parentid: int
     body_rootid: int
@@ -116,6 +117,8 @@ class Model(NamedTuple):
     name_bodyadr: int
     name_numericadr: int
     name_pluginadr: int
+    plugin_attr: int
+    plugin_attradr: int
     plugin_stateadr: int
     plugin_statenum: int
     M_rownnz: int

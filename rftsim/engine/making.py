@@ -2,8 +2,8 @@
 
 from rftsim.engine import block, checks, instance, names, sound
 from rftsim.engine.refusals import WHY
-from rftsim.law.body import header_at
-from rftsim.law.layout import HEADER_NUMBERS
+from rftsim.law.body import bed_at, header_at
+from rftsim.law.layout import HEADER_NUMBERS, ruts_size
 from rftsim.machine import claims
 from rftsim.machine.compiling import exact
 from rftsim.machine.memory import int32s, int64s, pointer
@@ -12,7 +12,8 @@ from rftsim.machine.memory import int32s, int64s, pointer
 @exact
 def initialise(model, data, m, d, number):
     """Make the block of an instance; what is wrong, see WHY, and the address of the name of what that is wrong with."""
-    bodies, state_size = instance.count_bodies(model, m, number), instance.granted_state(model, m, number)
+    bodies, asked = instance.count_bodies(model, m, number), instance.asked_ruts(model, m, number)
+    state_size = instance.granted_state(model, m, number) - asked
     words = block.state_start(bodies) // 8 + state_size
     place = claims.make(-1, d, number, words)
     if place < 0:
@@ -24,6 +25,7 @@ def initialise(model, data, m, d, number):
     start = int32s(pointer(m + model.plugin_stateadr), pointer(m + model.nplugin))[number]
     head = instance.head(address)
     head.state, head.state_size = pointer(d + data.plugin_state) + 8 * start, state_size
+    head.ruts_size = asked
     why, whose = _check(model, m, number, address)
     if why != WHY.none:
         claims.drop(place)
@@ -42,7 +44,15 @@ def _check(model, m, number, address):
         return why, own
     if not checks.sensors_fit(model, m, number):
         return WHY.sensor, own
-    head.bed_weight = sound.sealed_weight(instance.bed(model, m, address))
+    bed = instance.bed(model, m, address)
+    if head.ruts_size != ruts_size(bed_at(bed)):
+        return WHY.state, own
+    head.bed_weight = sound.sealed_weight(bed)
+    if bed_at(bed).relief != 0.0:
+        head.terrain, head.terrain_size = checks.check_terrain(model, m, own - text)
+        if head.terrain < 0:
+            return WHY.terrain, own
+        head.terrain_weight = checks.weigh_shape(instance.terrain(model, m, address))
     plugins = int32s(pointer(m + model.body_plugin), nbody)
     for body in range(nbody):
         owner = names.start_of(model, m, model.name_bodyadr, nbody, body)

@@ -1,10 +1,8 @@
 """Names of a model's elements for compiled code, which reads nothing outside their array."""
 
-from rftsim.engine.block import MORE_MARKER
 from rftsim.machine.compiling import exact, inline
 from rftsim.machine.memory import bytes_at, int32s, pointer
 
-_MORE = MORE_MARKER.encode()
 _ZERO, _COLON = ord("0"), ord(":")
 
 
@@ -55,16 +53,16 @@ def _rest_is_same(names, one, other):
 
 
 @exact
-def goes_on(names, numeric, owner, start, k):
-    """Whether the name at `numeric` is that of the k-th numeric of an owner's surface, whose marker stands at start."""
+def goes_on(names, numeric, more, owner, start, k):
+    """Whether the name at `numeric` is that of the k-th numeric of what is an owner's, whose marker stands at start."""
     for i in range(start):
         if letter(names, numeric + i) != letter(names, owner + i):
             return False
     at = numeric + start
-    for i in range(len(_MORE)):
-        if letter(names, at + i) != _MORE[i]:
+    for i in range(len(more)):
+        if letter(names, at + i) != more[i]:
             return False
-    at += len(_MORE)
+    at += len(more)
     power = 1
     while 10 * power <= k:
         power *= 10

@@ -18,6 +18,9 @@ from rftsim.machine import link
 EXPLICIT: Final = "rftsim.sand"
 IMPLICIT: Final = "rftsim.sand.implicit"
 """The two plugins: the force at the velocity of the moment, and the one at the end of the step."""
+RUTS: Final = "ruts"
+"""The attribute of an instance whose bed remembers: how many numbers of plugin_state that takes. MuJoCo asks for the
+size of the state before it has the model's numerics."""
 
 
 class Plugin(ctypes.Structure):
@@ -74,10 +77,12 @@ def register(name: str) -> int:
     plugin.capabilityflags = bits.mjPLUGIN_PASSIVE | bits.mjPLUGIN_SENSOR
     plugin.needstage = mujoco.mjtStage.mjSTAGE_ACC  # when MuJoCo has read the sensors of forces that are mended
     kind = "explicit" if name == EXPLICIT else "implicit"
+    attributes = (ctypes.c_char_p * 1)(RUTS.encode())
+    plugin.nattribute, plugin.attributes = len(attributes), ctypes.addressof(attributes)
     for field in ("nsensordata", "destroy", "copy", "reset", "advance"):
         setattr(plugin, field, address(f"rftsim_{field}"))
     for field in ("nstate", "init", "compute"):
         setattr(plugin, field, address(f"rftsim_{kind}_{field}"))
-    _keep.append(plugin)
+    _keep.extend((plugin, attributes))
     ctypes.pythonapi.Py_IncRef(ctypes.py_object(_keep))  # mjData may be freed after this module at exit
     return int(library.mjp_registerPlugin(ctypes.byref(plugin)))

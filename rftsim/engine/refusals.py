@@ -30,6 +30,7 @@ class Refusals(NamedTuple):
         f"finite, from 0 to {LARGEST:g}, its tolerance {TOLERANCES[0]:g} to {TOLERANCES[1]:g}, its iterations whole, "
         f"{COUNTS[0]} to {COUNTS[1]}"
     )
+    terrain: str = f"rftsim's plugin finds no terrain of bed '%s', or not the shape that was written: {_ANEW}"
     surface: str = (
         "rftsim's plugin finds no surface of body '%s', or not the one that was written: numerics were taken away, "
         f"cut, renamed, moved or changed; {_ANEW}"

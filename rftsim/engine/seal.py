@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 from rftsim.law.laws import RESPONSES
-from rftsim.law.layout import BED, numbers_in
+from rftsim.law.layout import BED, TERRAIN, numbers_in
 from rftsim.surface.triangles import Array
 
 SEAL: Final = np.dtype([("length", "f8"), ("exact", "f8", 4), ("printed", "f8", 4)])
@@ -46,7 +46,12 @@ def _places(name: str) -> range:
 PARAMETERS: Final = tuple(range(_places("dynamic").stop, _places("table").start))
 """Places of the sand's parameters in a packed bed."""
 SEALED: Final = np.array(
-    sorted(k for name in ("response", "plane", "dynamic", "table") for k in _places(name)), dtype=np.int64
+    sorted(
+        k
+        for name in ("response", "plane", "relief", "spacing", "rows", "columns", "dynamic", "table")
+        for k in _places(name)
+    ),
+    dtype=np.int64,
 )
 """Places of the numbers of a bed that its seal covers."""
 WEIGHED: Final = 256
@@ -56,8 +61,9 @@ WEIGHTS: Final = 0.5 + np.arange(1, 1 + WEIGHED) * (5**0.5 - 1) / 2 % 1.0
 TABLE: Final = _places("table")
 REST: Final = SEALED[~np.isin(SEALED, TABLE)]
 """Places of the table, and of the other numbers that the seal covers."""
-BED_NUMBERS: Final = numbers_in(BED)
 SEAL_NUMBERS: Final = numbers_in(SEAL)
+SHAPE: Final = np.array([k for k, name in enumerate(TERRAIN.names or ()) if name not in ("x", "y")], dtype=np.int64)
+"""Places of the numbers of a terrain that its seal covers."""
 
 
 def sealed_bed(bed: Array, name: str) -> Array:
@@ -68,6 +74,16 @@ def sealed_bed(bed: Array, name: str) -> Array:
         name: The bed's name.
     """
     return np.concatenate([bed, _seal(bed[SEALED], name, name)])
+
+
+def sealed_terrain(terrain: Array, name: str) -> Array:
+    """A packed terrain with its seal behind it, which covers its shape and leaves its place and heights free.
+
+    Args:
+        terrain: Packed terrain, a record of TERRAIN and its coefficients.
+        name: The bed's name.
+    """
+    return np.concatenate([terrain, _seal(terrain[SHAPE], name, name)])
 
 
 def sealed_surface(surface: Array, body: str, bed: str) -> Array:

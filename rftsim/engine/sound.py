@@ -3,9 +3,9 @@
 from numba import types
 
 from rftsim.engine import checks, instance
-from rftsim.engine.seal import BED_NUMBERS, TABLE
+from rftsim.engine.seal import TABLE
 from rftsim.law.body import header_at
-from rftsim.law.layout import HEADER_NUMBERS
+from rftsim.law.layout import BED_NUMBERS, HEADER_NUMBERS
 from rftsim.machine.compiling import exact, inline
 from rftsim.machine.memory import doubles, pointer, stack_doubles
 
@@ -30,7 +30,12 @@ def is_sound(model, m, address, state_size):
     sand = instance.bed(model, m, address)
     if not checks.is_within(sand) or sealed_weight(sand) != instance.head(address).bed_weight:
         return False
-    for k in range(instance.head(address).nbody):
+    head = instance.head(address)
+    if head.terrain > end - head.terrain_size or (
+        head.terrain_size > 0 and checks.weigh_shape(instance.terrain(model, m, address)) != head.terrain_weight
+    ):
+        return False
+    for k in range(head.nbody):
         member = instance.member(address, k)
         if member.start > end - member.size or not _has_header(instance.surface(model, m, address, k), member):
             return False

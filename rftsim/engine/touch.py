@@ -22,6 +22,7 @@ from rftsim.solver.newton import CREEP, V_C
 _SPHERE: Final = CONSTANTS["sphere"]
 _BOX: Final = CONSTANTS["box"]
 _COLUMNS: Final = len(PRESSED)
+_SAND: Final = instance.SAND_NUMBERS
 ALIGNED: Final = 0.9
 """Cosine between the triangles' force and the wrench's from which on the twist of the moment tells how sand presses."""
 SLOW: Final = 1e-3
@@ -101,7 +102,8 @@ def _pressed(model, data, m, d, t, address, k, site, is_implicit):
         return 0.0
     if instance.is_sound(m, address, instance.head(address).state_size) == 0:
         return np.nan
-    sand = instance.bed(model, m, address)
+    sand = stack_doubles(_SAND)
+    instance.fill_sand(model, m, address, sand)
     surface = instance.surface(model, m, address, k)
     n = int(header_at(surface).ntri)
     memory = take(8 * _COLUMNS * n)

@@ -1,19 +1,50 @@
 """Packed sand and surface for compiled code, from their addresses; see `layout`."""
 
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
+import numpy as np
+
+from rftsim.law import field as fields
+from rftsim.law.bound import over_relief
+from rftsim.law.frame import level_frame
 from rftsim.law.free_surface import box_is_clear
-from rftsim.law.layout import BED, BLOCK, BOX_NUMBERS, COLUMN, COLUMNS, HEADER, HEADER_NUMBERS, Medium, packed_size
-from rftsim.machine.compiling import inline
+from rftsim.law.laws import RESPONSES
+from rftsim.law.layout import BED, BLOCK, BOX_NUMBERS, COLUMN, COLUMNS, HEADER, HEADER_NUMBERS, Medium, prints_start
+from rftsim.machine.compiling import exact, inline
 from rftsim.machine.memory import doubles, peek
 from rftsim.machine.records import record_at, values_at
 
 bed_at = record_at(BED)
-"""The packed sand at an address."""
-medium_at = values_at(BED, Medium)
-"""The sand at an address as a law reads it."""
+"""The record BED at an address."""
+_medium_at = values_at(BED, Medium)
 header_at = record_at(HEADER)
 """The header of the packed surface at an address."""
+
+
+_PLANAR: Final = np.array([response.planar for response in RESPONSES])
+
+
+@inline
+def bed_of(sand):
+    """The record BED of a sand, from the address of its record SAND."""
+    return bed_at(fields.sand_at(sand).bed)
+
+
+@inline
+def medium_of(sand):
+    """The same as a law reads it, see `layout.Medium`."""
+    return _medium_at(fields.sand_at(sand).bed)
+
+
+@exact
+def frame_over(sand, surface, xpos, xmat, velocity, omega, reach):
+    """The frame of a body over undisturbed sand; of a relief also where the body comes within a reach [m]."""
+    bed, header = bed_of(sand), header_at(surface)
+    frame = level_frame(bed, xpos, xmat, velocity, omega)
+    if not fields.is_relief(sand):
+        return frame
+    field = fields.field_of(sand, _PLANAR[int(bed.response)])
+    return over_relief(frame, field, header.lowest, header.highest, reach)
 
 
 class Body(NamedTuple):
@@ -31,7 +62,7 @@ class Body(NamedTuple):
 def body_at(address):
     """The packed surface at an address."""
     header = header_at(address)
-    behind = packed_size(header) - HEADER_NUMBERS
+    behind = prints_start(header) - HEADER_NUMBERS
     return Body(address, int(header.ntri), doubles(address + 8 * HEADER_NUMBERS, behind))
 
 

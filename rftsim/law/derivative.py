@@ -11,9 +11,10 @@ from numba import carray, types
 
 from rftsim.law import leading
 from rftsim.law.frame import point_velocity
-from rftsim.law.free_surface import depth, up
+from rftsim.law.free_surface import drop
+from rftsim.law.grounds import ALL_COLUMNS, Ground
 from rftsim.law.laws import Response
-from rftsim.law.layout import BLOCK, COLUMN, COLUMNS
+from rftsim.law.layout import BLOCK, COLUMN
 from rftsim.law.leading import Edge
 from rftsim.law.selection import CAPACITY, LOOK, choosing, chosen_on_stack, filled_up
 from rftsim.law.stress import TINY
@@ -25,7 +26,7 @@ STEP_ASIDE: Final = 1e-7
 """Turn of the direction of motion [rad] by which the laws are differentiated."""
 _MATRIX: Final = 9
 """Numbers of a triangle's derivative, which lie before the triangles' columns: LLVM tells parts of one array apart."""
-_scratch = on_stack((_MATRIX + COLUMNS) * BLOCK, types.float64)
+_scratch = on_stack((_MATRIX + ALL_COLUMNS) * BLOCK, types.float64)
 
 
 class Aside(NamedTuple):
@@ -101,9 +102,10 @@ def _fill_matrix(k, i, t):
     k[i + 8 * BLOCK] = e2 * p2 + f2 * q2 + along * s2 * c + brake * i2 * i2 + edge * m2 * m2
 
 
-def derivative(response: Response) -> Any:
+def derivative(response: Response, ground: Ground) -> Any:
     """Make the derivative of `sums_ahead`'s present force and moment by the body's twist."""
     choose, stress, felt_depth = choosing(response, ahead=False), response.stress, response.felt_depth
+    columns = ground.columns
 
     @loop
     def fill(n, frame, medium, edge, v_c, completed, k):
@@ -116,12 +118,13 @@ def derivative(response: Response) -> Any:
             speed2 = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
             speed = np.sqrt(speed2 + TINY)
             inverse = 1.0 / speed
-            aside, above = _aside(v, inverse), up(x, y, z, frame)
-            s = stress(normal, v, above, frame, medium, bare)
-            one = stress(normal, _turned(aside.ahead, aside.first), above, frame, medium, bare).per_depth
-            two = stress(normal, _turned(aside.ahead, aside.second), above, frame, medium, bare).per_depth
+            deep, up, _ = ground.found(k, _MATRIX, BLOCK, i, x, y, z, frame)
+            aside, around = _aside(v, inverse), ground.local(frame, up)
+            s = stress(normal, v, up, around, medium, bare)
+            one = stress(normal, _turned(aside.ahead, aside.first), up, around, medium, bare).per_depth
+            two = stress(normal, _turned(aside.ahead, aside.second), up, around, medium, bare).per_depth
             (s0, s1, s2), (m0, m1, m2) = s.per_depth, s.along
-            deep = depth(x, y, z, frame)
+            deep -= drop(x, y, z, frame)
             radius = 1.0 / np.sqrt(speed2 + v_c * v_c + TINY)
             weight = area * larger(felt_depth(deep, medium), 0.0) * radius if speed2 > 0.0 else 0.0
             vn = v[0] * m0 + v[1] * m1 + v[2] * m2
@@ -140,10 +143,10 @@ def derivative(response: Response) -> Any:
     @loop
     def add_chosen(chosen, n, frame, medium, edge, v_c, completed, out):
         """Add the derivative of n chosen triangles to out, BLOCK by BLOCK."""
-        k = carray(_scratch(), ((_MATRIX + COLUMNS) * BLOCK,))
+        k = carray(_scratch(), ((_MATRIX + ALL_COLUMNS) * BLOCK,))
         for first in range(0, n, BLOCK):
             some = min(BLOCK, n - first)
-            for column in range(COLUMNS):
+            for column in range(columns):
                 for i in range(some):
                     k[i + (_MATRIX + column) * BLOCK] = chosen[first + i + column * CAPACITY]
             fill(some, frame, medium, edge, v_c, completed, k)
@@ -151,18 +154,20 @@ def derivative(response: Response) -> Any:
                 _add_rows(some, k, row, out)
 
     @loop
-    def added(body, frame, medium, edge, v_c, completed, out):
+    def added(body, frame, sand, medium, edge, v_c, completed, out):
         """Add the derivative to out, (6, 6).
 
         `completed` (0 or 1) asks for a matrix that cannot overshoot where the law jumps: tangent across the motion and
         secant along it (1 / r instead of v_c^2 / r^3, r^2 = |v|^2 + v_c^2), and secant where a face's edge leads.
         """
-        chosen, n, last = chosen_on_stack(), 0, 0
+        chosen, n, last, field = chosen_on_stack(), 0, 0, ground.field(sand)
         reach = leading.ALL if completed > 0.0 else leading.reach2(edge)
         while last < body.count:
             n, last = choose(body, last, frame, 0.0, reach, 0.0, chosen, n)
             if n > CAPACITY - LOOK or last >= body.count:
-                add_chosen(chosen, filled_up(chosen, n), frame, medium, edge, v_c, completed, out)
+                n = filled_up(chosen, n)
+                ground.settle(chosen, CAPACITY, n, frame, field)
+                add_chosen(chosen, n, frame, medium, edge, v_c, completed, out)
                 n = 0
 
     return added

@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from rftsim.law.laws import RESPONSES
-from rftsim.law.layout import BED, GIVEN, HEADER, record
+from rftsim.law.layout import BED, BED_NUMBERS, GIVEN, HEADER, SAND, numbers_in, record
 from rftsim.machine import link
 from rftsim.surface.triangles import Array
 
@@ -32,14 +32,26 @@ def _function(name: str, arguments: int) -> Any:
     return ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * arguments)(linked()(name))
 
 
+def handle(bed: Array) -> "np.ndarray[tuple[int], np.dtype[np.int64]]":
+    """The record SAND of packed sand, by which compiled code finds it, as numbers; it lives no longer than that.
+
+    Args:
+        bed: Packed sand, contiguous: a record of BED, and a packed terrain where its surface is a relief.
+    """
+    numbers = np.zeros(numbers_in(SAND), dtype=np.int64)
+    numbers[0] = bed.ctypes.data
+    numbers[1] = bed.ctypes.data + 8 * BED_NUMBERS if bed.size > BED_NUMBERS else 0
+    return numbers
+
+
 def triangle_stresses(
     bed: Array, surface: Array, xpos: Any, xmat: Any, velocity: Any, omega: Any
 ) -> tuple[Array, Array]:
     """Each triangle's stress [Pa] in the body frame, (ntri, 3), and effective depth [m], (ntri,)."""
     ntri = int(record(surface, HEADER).ntri)
-    arrays = [np.ascontiguousarray(x, dtype=float) for x in (bed, surface, xpos, xmat, velocity, omega)]
-    stress, depth = np.empty((ntri, 3)), np.empty(ntri)
-    _function("rftsim_tractions", 8)(*(array.ctypes.data for array in (*arrays, stress, depth)))
+    bed, *arrays = [np.ascontiguousarray(x, dtype=float) for x in (bed, surface, xpos, xmat, velocity, omega)]
+    stress, depth, sand = np.empty((ntri, 3)), np.empty(ntri), handle(bed)
+    _function("rftsim_tractions", 8)(*(array.ctypes.data for array in (sand, *arrays, stress, depth)))
     return stress, depth
 
 
@@ -96,7 +108,8 @@ def wrenches_of(bed: Array, surface: Array, numbers: Array) -> Array:
     count = len(numbers) // 18
     out = np.empty((count, 6))
     function, start, end = _function("rftsim_wrenches", 8), numbers.ctypes.data, out.ctypes.data
-    packed = bed.ctypes.data, surface.ctypes.data
+    sand = handle(bed)
+    packed = sand.ctypes.data, surface.ctypes.data
 
     def work(first: int, last: int) -> None:
         at = (start + 24 * first, start + 24 * count + 72 * first)

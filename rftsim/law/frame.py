@@ -2,7 +2,7 @@
 
 from typing import Any, NamedTuple
 
-from rftsim.law.vectors import cross, to_body
+from rftsim.law.vectors import cross, nine, to_body
 from rftsim.machine.kernel import exact_kernel, merged_kernel
 
 
@@ -25,6 +25,14 @@ class Frame(NamedTuple):
     """Half-space whose free surface has dropped: normal (3,) and offset, empty where all zero; shape (4,)."""
     drop: Any
     """Drop of the free surface there, delta h of [Agarwal] section 4.6.2 [m]."""
+    relief: Any
+    """Whether the free surface is no plane (0 or 1): then `rise` and `height` are those of a plane nowhere below it."""
+    place: Any
+    """Position of the body's origin, world frame [m], shape (3,)."""
+    turn: Any
+    """Body to world, row-major, shape (9,)."""
+    moved: Any
+    """Way that the body has gone since, in the parts of a step, along and about its axes [m, rad], shape (6,)."""
 
 
 @merged_kernel
@@ -51,4 +59,31 @@ def level_frame(bed: Any, xpos: Any, xmat: Any, velocity: Any, omega: Any) -> An
     up = to_body(xmat, bed.up[0], bed.up[1], bed.up[2])
     plane = to_body(xmat, bed.plane[0], bed.plane[1], bed.plane[2])
     height = bed.offset - (bed.up[0] * xpos[0] + bed.up[1] * xpos[1] + bed.up[2] * xpos[2])
-    return Frame(v0, w, up, up, cross(plane, up), height, (0.0, 0.0, 0.0, 0.0), 0.0)
+    rear, moved = (0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    place, turn = (xpos[0], xpos[1], xpos[2]), nine(xmat)
+    return Frame(v0, w, up, up, cross(plane, up), height, rear, 0.0, 0.0, place, turn, moved)
+
+
+@exact_kernel
+def over(frame: Any, up: Any, rise: Any, forward: Any, height: Any, relief: Any) -> Any:
+    """A frame over another free surface, or over a plane that stands for it."""
+    f = frame
+    return Frame(f.v0, f.omega, up, rise, forward, height, f.rear, f.drop, relief, f.place, f.turn, f.moved)
+
+
+@exact_kernel
+def behind(frame: Any, rear: Any, drop: Any) -> Any:
+    """A frame whose free surface has dropped in a half-space."""
+    f = frame
+    return Frame(
+        f.v0, f.omega, f.up, f.rise, f.forward, f.height, rear, drop, f.relief, f.place, f.turn, f.moved
+    )  # fmt: skip
+
+
+@exact_kernel
+def sunk(frame: Any, rise: Any, height: Any, moved: Any) -> Any:
+    """A frame at other depths, of a body that has moved by so much."""
+    f = frame
+    return Frame(
+        f.v0, f.omega, f.up, rise, f.forward, height, f.rear, f.drop, f.relief, f.place, f.turn, moved
+    )  # fmt: skip

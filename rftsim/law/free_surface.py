@@ -1,39 +1,32 @@
-"""The free surface at a point of a body: how deep the point lies, which way is up, how fast it sinks.
+"""The free surface of a frame as a plane: how deep a point of the body lies, how fast it rises, what is clear of it.
 
-Everything that asks for a depth or a normal calls these; a surface that is no plane would change this module.
+Of a relief it is a plane nowhere below it, which tells what can be in the sand; `relief` tells its depths.
 """
 
 from typing import Any
 
-from rftsim.law.frame import Frame
+from rftsim.law.frame import sunk
 from rftsim.machine.kernel import exact_kernel, kernel, merged_kernel
 
 
 @kernel
-def up(x: Any, y: Any, z: Any, frame: Any) -> Any:
-    """The free surface's normal above a point, shape (3,)."""
-    return frame.up
-
-
-@kernel
-def undisturbed_depth(x: Any, y: Any, z: Any, frame: Any) -> Any:
-    """The depth of a point below the free surface [m], whatever a wheel has made of it; negative above the sand."""
+def plane_depth(x: Any, y: Any, z: Any, frame: Any) -> Any:
+    """The depth of a point below the plane of a frame [m], whatever a wheel has made of it; negative above it."""
     ux, uy, uz = frame.rise
     return frame.height - (ux * x + uy * y + uz * z)
 
 
 @kernel
-def depth(x: Any, y: Any, z: Any, frame: Any) -> Any:
-    """The effective depth of a point, less the drop behind a wheel [m], [Agarwal] eq. (4.2)."""
+def drop(x: Any, y: Any, z: Any, frame: Any) -> Any:
+    """How much lower the free surface lies behind a wheel [m], [Agarwal] eq. (4.2)."""
     rx, ry, rz, r0 = frame.rear
-    drop = frame.drop if rx * x + ry * y + rz * z + r0 < 0.0 else 0.0
-    return undisturbed_depth(x, y, z, frame) - drop
+    return frame.drop if rx * x + ry * y + rz * z + r0 < 0.0 else 0.0
 
 
 @merged_kernel
-def rising(v: Any, frame: Any) -> Any:
-    """How fast what moves with a velocity v rises over the free surface [m/s]."""
-    ux, uy, uz = frame.rise
+def rising(v: Any, rise: Any) -> Any:
+    """How fast what moves with a velocity v rises over a surface whose height has the gradient `rise` [m/s]."""
+    ux, uy, uz = rise
     return v[0] * ux + v[1] * uy + v[2] * uz
 
 
@@ -58,11 +51,13 @@ def lowest_depth(lowest: Any, highest: Any, frame: Any) -> Any:
 @exact_kernel
 def after(frame: Any, h: Any) -> Any:
     """The frame at the depths after a time h of its motion, to first order; positions and normals stay."""
-    r, v, w = frame.rise, frame.v0, frame.omega
+    r, v, w, m = frame.rise, frame.v0, frame.omega, frame.moved
+    by = h * (1.0 - frame.relief)  # of a relief the depths of its points change, and not the plane
     turned = (
-        r[0] + h * (r[1] * w[2] - r[2] * w[1]),
-        r[1] + h * (r[2] * w[0] - r[0] * w[2]),
-        r[2] + h * (r[0] * w[1] - r[1] * w[0]),
+        r[0] + by * (r[1] * w[2] - r[2] * w[1]),
+        r[1] + by * (r[2] * w[0] - r[0] * w[2]),
+        r[2] + by * (r[0] * w[1] - r[1] * w[0]),
     )
-    lowered = frame.height - h * (v[0] * r[0] + v[1] * r[1] + v[2] * r[2])
-    return Frame(frame.v0, frame.omega, frame.up, turned, frame.forward, lowered, frame.rear, frame.drop)
+    lowered = frame.height - by * (v[0] * r[0] + v[1] * r[1] + v[2] * r[2])
+    moved = m[0] + h * v[0], m[1] + h * v[1], m[2] + h * v[2], m[3] + h * w[0], m[4] + h * w[1], m[5] + h * w[2]
+    return sunk(frame, turned, lowered, moved)

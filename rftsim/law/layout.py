@@ -15,8 +15,11 @@ from rftsim.errors import SandError
 from rftsim.law import tables
 from rftsim.law.laws import RESPONSES, Law
 from rftsim.machine.kernel import exact_kernel
+from rftsim.sand import ruts
 from rftsim.sand.free_surface import FreeSurface
 from rftsim.sand.medium import PARAMETERS, Sand
+from rftsim.sand.ruts import Ruts
+from rftsim.sand.terrain import PAD, Terrain
 from rftsim.surface.triangles import Array, Surface
 
 TERMS: Final = len(tables.TABLE_C4)
@@ -25,18 +28,41 @@ _MEDIUM: Final = [("dynamic", "f8"), *((name, "f8") for name in PARAMETERS), ("t
 
 BED: Final = np.dtype(
     [
-        *(("response", "f8"), ("up", "f8", 3), ("offset", "f8"), ("plane", "f8", 3)),
+        *(("response", "f8"), ("up", "f8", 3), ("offset", "f8"), ("plane", "f8", 3), ("relief", "f8")),
+        *(("spacing", "f8"), ("rows", "f8"), ("columns", "f8")),
         *(("tolerance", "f8"), ("iterations", "f8")),
         *_MEDIUM,
     ]
 )
 """Packed sand: its law's place in RESPONSES, normal and offset of the free surface, normal of the plane of motion,
-tolerance and most iterations of the implicit force, whether the law is dynamic (0 or 1), the parameters (zero where
-unknown), and the coefficients of f1, f2 and f3."""
+whether a terrain lies on that free surface (0 or 1); side of a cell of ruts [m] and how many of them there are along y
+and x, zero where the sand remembers nothing; tolerance and most iterations of the implicit force, whether the law is
+dynamic (0 or 1), the parameters (zero where unknown), and the coefficients of f1, f2 and f3."""
 TOLERANCE: Final = 3e-3
 """Error of a body's velocity, relative, to which the implicit force is solved for unless the user says otherwise."""
 ITERATIONS: Final = 40
 """Most iterations of one solution, unless the user says otherwise."""
+
+SAND: Final = np.dtype([("bed", "i8"), ("terrain", "i8"), ("ruts", "i8")])
+"""What compiled code is told of a sand: addresses, of its BED, and of a TERRAIN and of RUTS, zero where it has none."""
+RUTS: Final = np.dtype(
+    [
+        *((name, "f8") for name in ("row", "column", "travel", "clock", "moved", "left")),
+        ("unsettled", "f8", 4),
+    ]
+)
+"""The head of the ruts that a simulation remembers, all zero where there are none: row and column of the window's first
+cell, counted from the world's origin; the farthest that a body has moved [m] and the time [s] since they were looked
+at; volume that was displaced and that was left behind the window [m^3]; first row and column of what still slides, and
+those behind it. Then for each cell the height over the free surface [m], and for each block of BLOCK_SIDE x BLOCK_SIDE
+their mean. A cell's place is its row and column modulo those of the window."""
+BLOCK_SIDE: Final = ruts.BLOCK
+TERRAIN: Final = np.dtype(
+    [(name, "f8") for name in ("rows", "columns", "x", "y", "dx", "dy", "repeat")],
+)
+"""The head of a packed terrain, which lies on the plane of its bed: number of its values along y and x; place of the
+first and spacing along x and y [m]; whether it repeats (0 or 1). Its coefficients follow, see
+`Terrain.coefficients`."""
 
 Medium = namedtuple("Medium", [name for name, *_ in _MEDIUM])  # type: ignore[misc]
 Medium.__doc__ = "The sand as a law reads it: fields of BED, which compiled loops keep in registers."
@@ -54,12 +80,13 @@ HEADER: Final = np.dtype(
         ("rim_start", "f8", 3),
         ("made_from", "f8"),
         ("gravity", "f8", 3),
+        ("prints", "f8"),
     ]
 )
 """The head of a packed surface: leading-edge tolerance; lowest and highest corner [m]; axis, centre [m] and radius
 [m] of a wheel, zero where it is none; number of triangles; their root-mean-square distance from the origin [m]; the
 direction at which the wheel's angles start; what the surface was made from, and under which gravity [m/s^2], see
-`rftsim.model.stale`, zero where that is not known."""
+`rftsim.model.stale`, zero where that is not known; number of points by which it marks the sand."""
 
 
 class Columns(NamedTuple):
@@ -121,13 +148,13 @@ def record(numbers: Array, dtype: "np.dtype[Any]") -> Any:
 def pack_bed(
     sand: Sand,
     law: Law,
-    terrain: FreeSurface,
+    terrain: FreeSurface | Terrain,
     plane: ArrayLike,
     *,
     tolerance: float = TOLERANCE,
     iterations: int = ITERATIONS,
 ) -> Array:
-    """Sand under a law as numbers, a record of BED.
+    """Sand under a law as numbers: a record of BED, and a packed terrain where its surface is no plane.
 
     Args:
         sand: The medium.
@@ -141,7 +168,8 @@ def pack_bed(
         SandError: The law reads a parameter that is unknown of the sand, or is not one of LAWS nor made from one.
         ValueError: The plane's normal is not horizontal.
     """
-    up = np.array(terrain.normal)
+    level = FreeSurface() if isinstance(terrain, Terrain) else terrain
+    up = np.array(level.normal)
     normal = np.asarray(plane, dtype=float)
     length = np.linalg.norm(normal)
     if normal.shape != (3,) or not length > 0.0 or (law.planar and abs(normal @ up) > 1e-6 * length):
@@ -156,18 +184,46 @@ def pack_bed(
     numbers = np.zeros(numbers_in(BED))
     bed = record(numbers, BED)
     bed.response, bed.dynamic = RESPONSES.index(law.response), law.dynamic
-    bed.up, bed.offset, bed.plane = up, terrain.offset, normal / length
-    bed.tolerance, bed.iterations = tolerance, iterations
+    bed.up, bed.offset, bed.plane = up, level.offset, normal / length
+    bed.tolerance, bed.iterations, bed.relief = tolerance, iterations, isinstance(terrain, Terrain)
     for name in PARAMETERS:
         value = getattr(sand, name)
         bed[name] = 0.0 if value is None else value  # MuJoCo reads no NaN from XML
     for row, column in zip(bed.table, tables.columns(law.table), strict=True):
         row[: len(column)] = column
-    return numbers
+    return np.concatenate([numbers, pack_terrain(terrain)]) if isinstance(terrain, Terrain) else numbers
 
 
-def pack_surface(surface: Surface) -> Array:
-    """A surface as numbers: a record of HEADER, then a column for each of COLUMN, boxes, and a wheel's angles."""
+def remember(bed: Array, marks: Ruts) -> None:
+    """Have packed sand remember ruts.
+
+    Raises:
+        SandError: The sand's internal friction is unknown, whose angle is that at which heaps come to rest.
+    """
+    packed = record(bed, BED)
+    if packed.mu_int == 0.0:
+        raise SandError("sand that remembers needs the sand's mu_int, the tangent of the angle of its heaps: give it")
+    packed.spacing, (packed.columns, packed.rows) = marks.spacing, marks.cells
+
+
+def pack_terrain(terrain: Terrain) -> Array:
+    """A terrain as numbers: a record of TERRAIN, then its coefficients row by row."""
+    head = np.zeros(numbers_in(TERRAIN))
+    packed = record(head, TERRAIN)
+    packed.rows, packed.columns = terrain.heights.shape
+    packed.x, packed.y = terrain.origin
+    packed.dx, packed.dy = terrain.spacing
+    packed.repeat = terrain.repeat
+    return np.concatenate([head, terrain.coefficients.ravel()])
+
+
+def pack_surface(surface: Surface, prints: Array | None = None) -> Array:
+    """A surface as numbers: a record of HEADER, a column for each of COLUMN, boxes, a wheel's angles, and its prints.
+
+    Args:
+        surface: The triangles.
+        prints: Points by which it marks sand that remembers, body frame, (n, 3): three columns, then their boxes.
+    """
     points = np.concatenate([surface.corners, surface.centres])
     numbers = np.zeros(numbers_in(HEADER))
     header = record(numbers, HEADER)
@@ -180,7 +236,10 @@ def pack_surface(surface: Surface) -> Array:
         header.wheel_radius = surface.wheel.radius
         header.rim_start, angles = _rim_angles(surface, header)
     columns = *surface.centres.T, *surface.normals.T, surface.areas
-    return np.concatenate([numbers, *columns, _boxes(surface).ravel(), angles])
+    marks = np.empty((0, 3)) if prints is None else prints
+    header.prints = len(marks)
+    marking = (*marks.T, _boxes(marks).ravel()) if len(marks) else ()
+    return np.concatenate([numbers, *columns, _boxes(surface.centres).ravel(), angles, *marking])
 
 
 def _rim_angles(surface: Surface, header: Any) -> tuple[Array, Array]:
@@ -193,24 +252,47 @@ def _rim_angles(surface: Surface, header: Any) -> tuple[Array, Array]:
     return start, np.where(np.abs(surface.normals @ axis) <= RIM, angles, NO_RIM)
 
 
-def _boxes(surface: Surface) -> Array:
-    """Boxes of the centroids of each BLOCK of triangles, numbers of BOX, (nblock, 6)."""
-    starts = np.arange(0, surface.ntri, BLOCK)
-    low, high = (end.reduceat(surface.centres, starts, axis=0) for end in (np.minimum, np.maximum))
+def _boxes(points: Array) -> Array:
+    """Boxes of each BLOCK of points, or triangles' centroids, numbers of BOX, (nblock, 6)."""
+    starts = np.arange(0, len(points), BLOCK)
+    low, high = (end.reduceat(points, starts, axis=0) for end in (np.minimum, np.maximum))
     return np.hstack([low + high, high - low]) / 2
 
 
+BED_NUMBERS: Final = numbers_in(BED)
+TERRAIN_NUMBERS: Final = numbers_in(TERRAIN)
+RUTS_NUMBERS: Final = numbers_in(RUTS)
 HEADER_NUMBERS: Final = numbers_in(HEADER)
 BOX_NUMBERS: Final = numbers_in(BOX)
 COLUMNS: Final = len(COLUMN)
 
 
 @exact_kernel
-def packed_size(header: Any) -> Any:
-    """The number of numbers of the packed surface that starts with a header."""
+def terrain_size(head: Any) -> Any:
+    """The number of numbers of the packed terrain that starts with a head."""
+    return TERRAIN_NUMBERS + (int(head.rows) + 2 * PAD) * (int(head.columns) + 2 * PAD)
+
+
+@exact_kernel
+def prints_start(header: Any) -> Any:
+    """The number of numbers of a packed surface before its prints."""
     n = int(header.ntri)
     boxes = (n + BLOCK - 1) // BLOCK
     return HEADER_NUMBERS + COLUMNS * n + BOX_NUMBERS * boxes + (n if header.wheel_radius != 0.0 else 0)
+
+
+@exact_kernel
+def packed_size(header: Any) -> Any:
+    """The number of numbers of the packed surface that starts with a header."""
+    n = int(header.prints)
+    return prints_start(header) + 3 * n + BOX_NUMBERS * ((n + BLOCK - 1) // BLOCK)
+
+
+@exact_kernel
+def ruts_size(bed: Any) -> Any:
+    """The number of numbers that a simulation remembers of a bed's ruts."""
+    cells = int(bed.rows) * int(bed.columns)
+    return 0 if cells == 0 else RUTS_NUMBERS + cells + cells // (BLOCK_SIDE * BLOCK_SIDE)
 
 
 def read_columns(packed: Array) -> tuple[Array, ...]:

@@ -11,6 +11,7 @@ from rftsim.law import evaluate, layout
 from rftsim.law.laws import Law, get_law
 from rftsim.sand.free_surface import FreeSurface
 from rftsim.sand.medium import Sand
+from rftsim.sand.terrain import Terrain
 from rftsim.surface.triangles import Array, Surface
 
 ROTATION_ERROR: Final = 1e-6
@@ -64,7 +65,7 @@ class Intruder:
         law: "str | Law" = "rft3d",
         *,
         plane: ArrayLike = (0.0, 1.0, 0.0),
-        terrain: FreeSurface | None = None,
+        terrain: FreeSurface | Terrain | None = None,
     ) -> None:
         """Pack a surface and the sand around it.
 
@@ -80,7 +81,7 @@ class Intruder:
             ValueError: There is no such law, or the plane's normal is not horizontal.
         """
         self.surface, self.sand, self.law = surface, sand, get_law(law)
-        self.terrain = FreeSurface() if terrain is None else terrain
+        self.terrain: FreeSurface | Terrain = FreeSurface() if terrain is None else terrain
         self._bed = layout.pack_bed(sand, self.law, self.terrain, plane)
         self._packed = layout.pack_surface(surface.clustered(layout.BLOCK))
 
@@ -119,7 +120,7 @@ def surface_force(
     velocity: ArrayLike = _REST,
     angular_velocity: ArrayLike = _REST,
     plane: ArrayLike = (0.0, 1.0, 0.0),
-    terrain: FreeSurface | None = None,
+    terrain: FreeSurface | Terrain | None = None,
 ) -> SurfaceForce:
     """Force of sand on a surface that moves as a rigid body, with that on each triangle; for many poses, `Intruder`.
 

@@ -11,7 +11,8 @@ from numba import carray, types
 
 from rftsim.law import body as bodies
 from rftsim.law.frame import point_velocity
-from rftsim.law.free_surface import depth, rising
+from rftsim.law.free_surface import drop, plane_depth, rising
+from rftsim.law.grounds import ALL_COLUMNS
 from rftsim.law.laws import Response
 from rftsim.law.layout import BLOCK, COLUMN, COLUMNS
 from rftsim.law.leading import may_lead
@@ -26,7 +27,7 @@ CAPACITY: Final = 392
 LANES: Final = 8
 """They are filled up to a multiple of this with ones without area: what is left over of a vectorised loop is slow."""
 
-_columns, _scores = on_stack(COLUMNS * CAPACITY, types.float64), on_stack(LOOK, types.float64)
+_columns, _scores = on_stack(ALL_COLUMNS * CAPACITY, types.float64), on_stack(LOOK, types.float64)
 _indices = on_stack(LOOK, types.int64)
 
 
@@ -47,8 +48,8 @@ def next_run(body, start, frame, margin):
 
 @inline
 def chosen_on_stack():
-    """Space for the chosen triangles, on the stack: columns of CAPACITY, in the order of a packed surface."""
-    return carray(_columns(), (COLUMNS * CAPACITY,))
+    """Space for the chosen triangles, on the stack: ALL_COLUMNS of CAPACITY, first those of a packed surface."""
+    return carray(_columns(), (ALL_COLUMNS * CAPACITY,))
 
 
 @inline
@@ -87,9 +88,9 @@ def choosing(response: Response, ahead: bool) -> Any:
     @inline
     def score(x, y, z, n, frame, reach2, h):
         v = point_velocity(frame, x, y, z)
-        deep = depth(x, y, z, frame)
+        deep = plane_depth(x, y, z, frame) - drop(x, y, z, frame)
         if ahead:
-            deep = larger(deep, deep - h * rising(v, frame))
+            deep = larger(deep, deep - h * rising(v, frame.rise))
         speed2 = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
         return smaller(deep, may_lead(normal_speed(n, v, frame), speed2, reach2))
 

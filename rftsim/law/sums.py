@@ -1,6 +1,7 @@
 """The loops over a body's triangles: sums of force and moment, and the tractions themselves.
 
-Each is made for a response of the sand, see `laws`; they are what everything else calls.
+Each is made for a response of the sand, see `laws`, and a kind of free surface, see `grounds`; they are what everything
+else calls.
 """
 
 from typing import Any, NamedTuple
@@ -9,7 +10,8 @@ import numpy as np
 
 from rftsim.law import body as bodies
 from rftsim.law.frame import point_velocity
-from rftsim.law.free_surface import depth, rising, up
+from rftsim.law.free_surface import drop, rising
+from rftsim.law.grounds import Ground
 from rftsim.law.laws import Response
 from rftsim.law.layout import PRESSED
 from rftsim.law.leading import reach2
@@ -56,19 +58,25 @@ def _force(stress, weight, held):
     return weight * sx + held * mx, weight * sy + held * my, weight * sz + held * mz
 
 
-@inline_loop
-def deepest(body, frame):
-    """The largest depth of a body's triangles [m]; any negative number where none is in the sand."""
-    found, last = -1e30, 0
-    while last < body.count:
-        first, last = next_run(body, last, frame, 0.0)
-        for i in range(first, last):
-            x, y, z = bodies.centre(body, i)
-            found = larger(found, depth(x, y, z, frame))
+def deepest(response: Response, ground: Ground) -> Any:
+    """Make the largest depth of a body's triangles [m]; any negative number where none is in the sand."""
+
+    @inline_loop
+    def found(body, frame, sand):
+        field, most, last = ground.field(sand), -1e30, 0
+        while last < body.count:
+            first, last = next_run(body, last, frame, 0.0)
+            for i in range(first, last):
+                x, y, z = bodies.centre(body, i)
+                most = larger(
+                    most, ground.look(x, y, z, bodies.normal(body, i), frame, field)[0] - drop(x, y, z, frame)
+                )
+        return most
+
     return found
 
 
-def sums(response: Response) -> Any:
+def sums(response: Response, ground: Ground) -> Any:
     """Make the sum of force and moment over a packed body, at the velocity of the moment."""
     choose, stress, felt_depth = choosing(response, ahead=False), response.stress, response.felt_depth
 
@@ -76,27 +84,31 @@ def sums(response: Response) -> Any:
     def add(chosen, n, frame, medium, edge, total):
         for i in range(n):
             x, y, z = centre(chosen, i)
-            v = point_velocity(frame, x, y, z)
-            s = stress(normal(chosen, i), v, up(x, y, z, frame), frame, medium, edge)
-            deep, a = depth(x, y, z, frame), area(chosen, i)
+            v, a = point_velocity(frame, x, y, z), area(chosen, i)
+            deep, up, _ = ground.found(chosen, 0, CAPACITY, i, x, y, z, frame)
+            deep -= drop(x, y, z, frame)
+            s = stress(normal(chosen, i), v, up, ground.local(frame, up), medium, edge)
             held = a * s.inertia if deep > 0.0 else 0.0
             total = _added(total, _force(s, a * larger(felt_depth(deep, medium), 0.0), held), x, y, z)
         return total
 
     @inline_loop
-    def summed(body, frame, medium, edge):
+    def summed(body, frame, sand, medium, edge):
         """The sand's wrench on a body."""
         chosen, n, reach, total, last = chosen_on_stack(), 0, reach2(edge), _nothing(), 0
+        field = ground.field(sand)
         while last < body.count:
             n, last = choose(body, last, frame, 0.0, reach, 0.0, chosen, n)
             if n > CAPACITY - LOOK or last >= body.count:
-                total, n = add(chosen, filled_up(chosen, n), frame, medium, edge, total), 0
+                n = filled_up(chosen, n)
+                ground.settle(chosen, CAPACITY, n, frame, field)
+                total, n = add(chosen, n, frame, medium, edge, total), 0
         return total
 
     return summed
 
 
-def sums_ahead(response: Response) -> Any:
+def sums_ahead(response: Response, ground: Ground) -> Any:
     """Make the sums of a law made continuous at rest, now and at the depths after a time h of this motion.
 
     The resistance is scaled by |v| / sqrt(|v|^2 + v_c^2): the force of a law that knows only the direction of motion
@@ -111,9 +123,10 @@ def sums_ahead(response: Response) -> Any:
             v = point_velocity(frame, x, y, z)
             speed2 = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
             slow = np.sqrt(speed2 / (speed2 + v_c * v_c + TINY))
-            s = stress(n_hat, v, up(x, y, z, frame), frame, medium, edge)
-            deep = depth(x, y, z, frame)
-            later = deep - h * rising(v, frame)
+            deep, up, rise = ground.found(chosen, 0, CAPACITY, i, x, y, z, frame)
+            deep -= drop(x, y, z, frame)
+            s = stress(n_hat, v, up, ground.local(frame, up), medium, edge)
+            later = deep - h * rising(v, rise)
             held = a * s.inertia if deep > 0.0 else 0.0
             now = _added(now, _force(s, slow * a * larger(felt_depth(deep, medium), 0.0), held), x, y, z)
             held = a * s.inertia if later > 0.0 else 0.0
@@ -121,21 +134,23 @@ def sums_ahead(response: Response) -> Any:
         return now, after
 
     @inline_loop
-    def summed(body, frame, medium, edge, v_c, h, margin):
+    def summed(body, frame, sand, medium, edge, v_c, h, margin):
         """The wrench at the present depths, and that at the later ones; no triangle moves further than the margin."""
-        chosen, n, reach, last = chosen_on_stack(), 0, reach2(edge), 0
+        chosen, n, reach, last, field = chosen_on_stack(), 0, reach2(edge), 0, ground.field(sand)
         now, after = _nothing(), _nothing()
         while last < body.count:
             n, last = choose(body, last, frame, margin, reach, h, chosen, n)
             if n > CAPACITY - LOOK or last >= body.count:
-                now, after = add(chosen, filled_up(chosen, n), frame, medium, edge, v_c, h, now, after)
+                n = filled_up(chosen, n)
+                ground.settle(chosen, CAPACITY, n, frame, field)
+                now, after = add(chosen, n, frame, medium, edge, v_c, h, now, after)
                 n = 0
         return now, after
 
     return summed
 
 
-def pressures(response: Response) -> Any:
+def pressures(response: Response, ground: Ground) -> Any:
     """Make the loop that lists the triangles which the sand can act on, with the force that presses on each."""
     choose, stress, felt_depth = choosing(response, ahead=False), response.stress, response.felt_depth
 
@@ -146,8 +161,9 @@ def pressures(response: Response) -> Any:
             v = point_velocity(frame, x, y, z)
             speed2 = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
             slow = np.sqrt(speed2 / (speed2 + v_c * v_c + TINY))
-            s = stress((nx, ny, nz), v, up(x, y, z, frame), frame, medium, edge)
-            deep = depth(x, y, z, frame)
+            deep, up, _ = ground.found(chosen, 0, CAPACITY, i, x, y, z, frame)
+            deep -= drop(x, y, z, frame)
+            s = stress((nx, ny, nz), v, up, ground.local(frame, up), medium, edge)
             held = a * s.inertia if deep > 0.0 else 0.0
             g = _force(s, slow * a * larger(felt_depth(deep, medium), 0.0), held)
             out[i, PRESSED.x], out[i, PRESSED.y], out[i, PRESSED.z] = x, y, z
@@ -157,13 +173,14 @@ def pressures(response: Response) -> Any:
         return total
 
     @inline_loop
-    def listed(body, frame, medium, edge, v_c, out):
+    def listed(body, frame, sand, medium, edge, v_c, out):
         """Fill rows of out with columns PRESSED; how many there are, and the wrench on all of them."""
-        chosen, n, reach, last = chosen_on_stack(), 0, reach2(edge), 0
+        chosen, n, reach, last, field = chosen_on_stack(), 0, reach2(edge), 0, ground.field(sand)
         count, total = 0, _nothing()
         while last < body.count:
             n, last = choose(body, last, frame, 0.0, reach, 0.0, chosen, n)
             if n > CAPACITY - LOOK or last >= body.count:
+                ground.settle(chosen, CAPACITY, n, frame, field)
                 total = add(chosen, n, frame, medium, edge, v_c, out[count:], total)
                 count, n = count + n, 0
         return count, total
@@ -171,17 +188,19 @@ def pressures(response: Response) -> Any:
     return listed
 
 
-def tractions(response: Response) -> Any:
+def tractions(response: Response, ground: Ground) -> Any:
     """Make the loop that fills each triangle's stress [Pa], (ntri, 3), and effective depth [m], (ntri,)."""
     stress, felt_depth = response.stress, response.felt_depth
 
     @inline_loop
-    def filled(body, frame, medium, edge, stress_out, depth_out):
+    def filled(body, frame, sand, medium, edge, stress_out, depth_out):
+        field = ground.field(sand)
         for i in range(depth_out.size):
             x, y, z = bodies.centre(body, i)
             v = point_velocity(frame, x, y, z)
-            deep = depth(x, y, z, frame)
-            s = stress(bodies.normal(body, i), v, up(x, y, z, frame), frame, medium, edge)
+            deep, up, _ = ground.look(x, y, z, bodies.normal(body, i), frame, field)
+            deep -= drop(x, y, z, frame)
+            s = stress(bodies.normal(body, i), v, up, ground.local(frame, up), medium, edge)
             held = s.inertia if deep > 0.0 else 0.0
             depth_out[i] = deep
             force = _force(s, larger(felt_depth(deep, medium), 0.0), held)

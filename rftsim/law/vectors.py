@@ -47,3 +47,11 @@ def larger(x: Any, y: Any) -> Any:
 def smaller(x: Any, y: Any) -> Any:
     """The smaller of two numbers; x where x is no number."""
     return y if x > y else x
+
+
+@exact_kernel
+def nine(matrix: Any) -> Any:
+    """The nine numbers of a matrix, row by row, as a tuple."""
+    return (
+        matrix[0], matrix[1], matrix[2], matrix[3], matrix[4], matrix[5], matrix[6], matrix[7], matrix[8]
+    )  # fmt: skip

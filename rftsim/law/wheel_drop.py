@@ -6,8 +6,8 @@ import numpy as np
 from numba import carray, types
 
 from rftsim.law import body as bodies
-from rftsim.law.frame import Frame, point_velocity
-from rftsim.law.free_surface import undisturbed_depth
+from rftsim.law.frame import behind, point_velocity
+from rftsim.law.grounds import Ground
 from rftsim.law.laws import Response
 from rftsim.law.layout import BLOCK, NO_RIM
 from rftsim.law.leading import may_lead
@@ -24,7 +24,7 @@ def _vector(field):
     return field[0], field[1], field[2]
 
 
-def dropped(response: Response) -> Any:
+def dropped(response: Response, ground: Ground) -> Any:
     """Make what gives a body's frame with the free surface as its wheel has left it, if it is one.
 
     delta h = r (r omega^2 / g) over the rear half of the contact arc: the arc that the submerged leading triangles of
@@ -33,7 +33,7 @@ def dropped(response: Response) -> Any:
     normal_speed = response.normal_speed
 
     @inline_loop
-    def rim_angles(body, start, count, frame, down, out):
+    def rim_angles(body, start, count, frame, field, down, out):
         """Fill out with the angle of each of count triangles that is rim, submerged and leading; or NO_RIM."""
         for i in range(count):
             x, y, z = bodies.centre(body, start + i)
@@ -43,10 +43,11 @@ def dropped(response: Response) -> Any:
             angle = on_rim - down
             angle -= 2.0 * np.pi if angle > np.pi else 0.0
             angle += 2.0 * np.pi if angle < -np.pi else 0.0
-            out[i] = angle if (undisturbed_depth(x, y, z, frame) > 0.0) & leads & (on_rim < NO_RIM) else NO_RIM
+            deep = ground.look(x, y, z, bodies.normal(body, start + i), frame, field)[0]
+            out[i] = angle if (deep > 0.0) & leads & (on_rim < NO_RIM) else NO_RIM
 
     @inline
-    def arc(body, frame, down):
+    def arc(body, frame, field, down):
         """First and last of the rim's submerged leading triangles, by their angle from down on; last < first: none."""
         least, most = carray(_least(), (BLOCK,)), carray(_most(), (BLOCK,))
         angles = carray(_angles(), (BLOCK,))
@@ -57,7 +58,7 @@ def dropped(response: Response) -> Any:
             if bodies.block_is_clear(body, block, frame, 0.0):
                 continue
             start = BLOCK * block
-            rim_angles(body, start, min(BLOCK, body.count - start), frame, down, angles)
+            rim_angles(body, start, min(BLOCK, body.count - start), frame, field, down, angles)
             for i in range(BLOCK):  # lane by lane: a minimum over all waits for each before it
                 least[i] = smaller(angles[i], least[i])
                 most[i] = larger(angles[i] if angles[i] < NO_RIM else -NO_RIM, most[i])
@@ -67,7 +68,7 @@ def dropped(response: Response) -> Any:
         return first, last
 
     @inline
-    def behind(body, frame, g):
+    def half_space(body, frame, field, g):
         """The half-space whose free surface has dropped, (4,), and by how much [m]; zeros where it has not."""
         header, nothing = bodies.header_at(body.address), ((0.0, 0.0, 0.0, 0.0), 0.0)
         axis, centre, start = _vector(header.wheel_axis), _vector(header.wheel_centre), _vector(header.rim_start)
@@ -83,7 +84,7 @@ def dropped(response: Response) -> Any:
             (along * axis[1] - frame.up[1]) / level,
             (along * axis[2] - frame.up[2]) / level,
         )
-        first, last = arc(body, frame, np.arctan2(dot(down, cross(axis, start)), dot(down, start)))
+        first, last = arc(body, frame, field, np.arctan2(dot(down, cross(axis, start)), dot(down, start)))
         if last < first:
             return nothing
         middle = -0.5 * (first + last) if spin > 0.0 else 0.5 * (first + last)
@@ -94,10 +95,10 @@ def dropped(response: Response) -> Any:
         return (onward[0], onward[1], onward[2], offset), radius * radius * spin * spin / g
 
     @inline
-    def drop(body, frame, medium):
+    def drop(body, frame, sand, medium):
         if medium.dynamic == 0.0 or bodies.header_at(body.address).wheel_radius == 0.0:
             return frame
-        rear, by = behind(body, frame, medium.g)
-        return Frame(frame.v0, frame.omega, frame.up, frame.rise, frame.forward, frame.height, rear, by)
+        rear, by = half_space(body, frame, ground.field(sand), medium.g)
+        return behind(frame, rear, by)
 
     return drop

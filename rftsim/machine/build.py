@@ -71,7 +71,7 @@ def _entry(name: str, signature: Any, compiled: str) -> str:
         define {c} @{name}({parameters}) {{
             %result = alloca {result}
             %raised = alloca ptr
-            store {result} {"null" if c == "void" else 0}, ptr %result
+            store {result} zeroinitializer, ptr %result
             %status = call i32 @"{compiled}"(ptr %result, ptr %raised, {parameters})
             %bad = icmp ne i32 %status, 0
             br i1 %bad, label %failed, label %done

@@ -6,48 +6,36 @@ from pathlib import Path
 from typing import Any, Final, Literal, NamedTuple, get_args
 
 import mujoco
-import numpy as np
 from numpy.typing import ArrayLike
 
-from rftsim.engine import block, plugin
+from rftsim.engine import plugin
 from rftsim.errors import RftsimNote, RftsimWarning, SceneError
 from rftsim.law import layout
 from rftsim.law.laws import Law, get_law
-from rftsim.model import doubts
+from rftsim.model import doubts, standing
 from rftsim.model.draft import Draft, make_draft, name_bodies
+from rftsim.model.drawing import check_drawing, write_drawing
 from rftsim.model.economy import economise
 from rftsim.model.felt import Choice, Felt, felt_bodies
-from rftsim.model.floors import (
-    Floors,
-    Ground,
-    carrying,
-    find_floors,
-    find_ground,
-    floor_doubts,
-    remove_floors,
-    say_ground,
-)
+from rftsim.model.floors import Floors, carrying, find_floors, floor_doubts, remove_floors, say_ground
 from rftsim.model.geometry import Geoms, Meshes
-from rftsim.model.planar import check_planar
+from rftsim.model.marks import marks_for
+from rftsim.model.planar import check_planar, plane_of
+from rftsim.model.reach import slopes_of
 from rftsim.model.readings import reading_doubts
 from rftsim.model.shaping import Fineness
+from rftsim.model.site import find_site
 from rftsim.model.solution import check_solution
 from rftsim.model.stale import mark
-from rftsim.model.standing import stand
 from rftsim.model.wheels import rolling
-from rftsim.model.write import (
-    Carrier,
-    check_bed,
-    check_drawing,
-    check_sensors,
-    write_bed,
-    write_drawing,
-    write_sensors,
-)
+from rftsim.model.write import Carrier, check_bed, check_sensors, write_bed, write_sensors
 from rftsim.reduction.reduce import Economy
 from rftsim.sand.free_surface import FreeSurface
 from rftsim.sand.medium import Sand
 from rftsim.sand.presets import make_sand
+from rftsim.sand.ruts import Ruts
+from rftsim.sand.terrain import Terrain
+from rftsim.surface.prints import prints_of
 from rftsim.surface.triangles import Array, Surface, Wheel
 
 REDUCTION: Final = 0.01
@@ -67,7 +55,7 @@ class Bed(NamedTuple):
     """The medium."""
     law: Law
     """The law of its force."""
-    terrain: FreeSurface
+    terrain: "FreeSurface | Terrain"
     """The surface that bounds it from above."""
     surfaces: dict[str, Surface]
     """Surface of each body that feels the sand, by body name."""
@@ -87,8 +75,9 @@ def add_sand(
     law: "Law | str" = "rft3d",
     *,
     bodies: "Iterable[str] | str | None" = None,
-    terrain: "FreeSurface | float | None" = None,
+    terrain: "FreeSurface | Terrain | float | str | None" = None,
     keep_floor: bool = False,
+    ruts: "Ruts | bool" = False,
     plane: ArrayLike = (0.0, 1.0, 0.0),
     geoms: Geoms = "collision",
     meshes: Meshes = "hull",
@@ -113,10 +102,15 @@ def add_sand(
         sand: The medium, see `make_sand`.
         law: A law, its name, or `rft3d:FILE.toml`, see `get_law`.
         bodies: Names of the bodies that feel the sand; by default each that can move and has geoms.
-        terrain: The free surface of the sand, or its height [m]; by default that of the floor: the top of the plane,
-            box, mesh or height field that the model stands on at its first keyframe, or z = 0 where there is none.
+        terrain: The free surface of the sand; its height [m]; the name of a height field geom, which then is sand; or a
+            text that names one, as `slope=10`, `dunes,amplitude=0.05` or `hill.png,size=8,high=0.5`, see
+            `make_terrain`. By default that of the floor: the top of the plane, box or mesh, or the relief of the height
+            field, that the model stands on at its first keyframe, or z = 0 where there is none.
         keep_floor: Leave the floors at the sand's level as they are. By default they lose their collision, and their
             contact pairs, and are hidden.
+        ruts: Sand that remembers: where a body passes, the surface is lowered to what it swept, and what it displaced
+            piles up beside it and slides to the angle of repose, which needs the sand's `mu_int`. `True` takes cells
+            that fit the bodies, `Ruts` others.
         plane: Normal of the vertical plane of motion, for the 2D laws. Joints have to keep the bodies in it, as nothing
             would stop them across it.
         geoms: Which geoms bound a body: those that can collide, or `all`: where it has none of these, those it has.
@@ -125,7 +119,8 @@ def add_sand(
         max_edge: Longest edge of a triangle [m]; by default a sixth of each geom's size.
         reduction: Model only what the scene needs: the fewest elements whose wrench is that of all triangles within
             this share (see `rftsim.reduction`), in the poses and motions that the joints allow, and none of bodies that
-            cannot reach the sand unless they are named in `bodies`. It holds for this sand, law and tree. Zero models
+            cannot reach the sand unless they are named in `bodies`. It holds for this sand, law and tree, and for each
+            slope that a terrain has. Zero models
             every triangle of every body, also for a model that is attached to another, or whose sand is tilted later.
         wheels: Driven wheels, behind which the dynamic laws let the free surface drop: names, whose axis is then that
             of their hinge and whose radius that of their surface; or `Wheel` by name.
@@ -154,24 +149,28 @@ def add_sand(
     check_bed(spec, name)
     draft = make_draft(spec)  # what is checked; the spec itself stays as it is until all is well
     _check_model(draft.model)
-    site = _site(spec, draft, terrain)
+    site = find_site(spec, draft, terrain)
     numbers = layout.pack_bed(bed_sand, bed_law, site.terrain, plane, tolerance=tolerance, iterations=iterations)
     choice = Choice(
         bodies=None if bodies is None else frozenset(_names(bodies)),
         fineness=Fineness(geoms, meshes, max_edge),
-        plane=layout.record(numbers, layout.BED).plane if bed_law.planar else None,
+        plane=plane_of(numbers, bed_law, site.terrain),
         terrain=site.terrain if reduction and bodies is None else None,
     )
     felt = felt_bodies(draft.model, draft.data, choice)
     check_planar(draft.model, draft.data, felt.surfaces, bed_law, choice.plane)
     wheeled = rolling(draft.model, felt.surfaces, wheels if isinstance(wheels, Mapping) else _names(wheels))
     felt.surfaces.update(wheeled if bed_law.dynamic else {})
-    economies = economise(draft.model, felt, numbers, reduction) if reduction else {}
+    marks = marks_for(draft.data, draft.model, felt.surfaces) if ruts is True else ruts or None
+    whole = dict(felt.surfaces)
+    economies = economise(draft.model, felt, numbers, reduction, slopes_of(site.terrain, choice.plane))
     floors = find_floors(draft.model, draft.data, site.terrain, max(s.size for s in felt.surfaces.values()))
     check_sensors(spec, felt.surfaces if sensors else ())
     if draw:
         check_drawing(spec, name)
-    packed = _packed(draft.model, felt)
+    if marks is not None:
+        layout.remember(numbers, marks)
+    packed = _packed(draft.model, felt, marks, whole)
     notes = [*_doubts(draft, bed_sand, numbers, packed, felt, floors), *(floor_doubts(floors) if keep_floor else ())]
 
     name_bodies(spec, draft)
@@ -179,34 +178,14 @@ def add_sand(
     write_bed(spec, carrier, numbers, packed)
     write_sensors(spec, carrier, felt.surfaces if sensors else ())
     if draw:
-        write_drawing(spec, name, site.terrain)
+        write_drawing(spec, name, site.terrain, draft)
     choices = [*felt.choices, *_integrate(spec, force)]
     if not keep_floor:
-        choices = say_ground(site.ground, floors, remove_floors(spec, floors)) + choices
+        choices = say_ground(site.field, floors, remove_floors(spec, floors)) + choices
     _tell(choices, notes)
     return Bed(
         name, bed_sand, bed_law, site.terrain, felt.surfaces, felt.reasons, tuple(choices), tuple(notes), economies
     )
-
-
-class _Site(NamedTuple):
-    """Where the sand lies."""
-
-    terrain: FreeSurface
-    ground: Ground | None
-    """What the model stands on; None where the caller said where the sand lies, and where there is nothing."""
-
-
-def _site(spec: mujoco.MjSpec, draft: Draft, terrain: "FreeSurface | float | None") -> _Site:
-    """The free surface that was asked for, or that of another bed of the model, or that of its floor, or z = 0."""
-    if terrain is not None:
-        return _Site(terrain if isinstance(terrain, FreeSurface) else FreeSurface(height=terrain), None)
-    for numeric in spec.numerics:
-        if block.SAND_MARKER in numeric.name:
-            other = layout.record(np.array(numeric.data), layout.BED)
-            return _Site(FreeSurface(float(other.offset / other.up[2]), tuple(other.up.tolist())), None)
-    ground = find_ground(draft.model, draft.data)
-    return _Site(FreeSurface() if ground is None else ground.terrain, ground)
 
 
 def _integrate(spec: mujoco.MjSpec, force: str) -> list[str]:
@@ -217,9 +196,14 @@ def _integrate(spec: mujoco.MjSpec, force: str) -> list[str]:
     return ["the integrator is implicitfast now: RK4 would take the sand's force at the velocity of the moment"]
 
 
-def _packed(model: mujoco.MjModel, felt: Felt) -> dict[str, Array]:
-    """The surfaces as numbers, marked with what they were made from, by body name."""
-    packed = {name: layout.pack_surface(surface) for name, surface in felt.surfaces.items()}
+def _packed(model: mujoco.MjModel, felt: Felt, marks: Ruts | None, whole: Mapping[str, Surface]) -> dict[str, Array]:
+    """The surfaces as numbers, with prints of the whole ones, marked with what they were made from, by body name."""
+    packed = {
+        name: layout.pack_surface(
+            surface, None if marks is None else prints_of(whole[name], marks.spacing, layout.BLOCK)
+        )
+        for name, surface in felt.surfaces.items()
+    }
     for name, numbers in packed.items():
         mark(model, model.body(name).id, numbers)
     return packed
@@ -231,7 +215,7 @@ def _doubts(
     """The doubts about surfaces, gravity and sensors, and those that show when the model stands in its sand."""
     model = draft.model
     packed = {model.body(name).id: numbers for name, numbers in surfaces.items()}
-    found = stand(model, draft.data, bed, packed)
+    found = standing.stand(model, draft.data, standing.PackedBed(bed, packed, floors.terrain))
     return [
         *felt.doubts,
         *doubts.gravity_doubts(model, sand),

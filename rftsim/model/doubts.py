@@ -1,5 +1,6 @@
 """Doubts about a model on sand that its numbers tell before it runs: units, footprints, and how deep it will sink."""
 
+import math
 from collections.abc import Mapping
 from typing import Final
 
@@ -8,16 +9,15 @@ import numpy as np
 
 from rftsim.model.geometry import colliding, geom_triangles, own_geoms
 from rftsim.model.standing import Foot, Standing
-from rftsim.sand.free_surface import FreeSurface
+from rftsim.sand.free_surface import FreeSurface, slope_normal
 from rftsim.sand.medium import Sand
+from rftsim.sand.terrain import Terrain
 from rftsim.surface.triangles import Array, Surface
 
 SMALL: Final = 0.25
 """Footprint of what collides over that of what is seen below which the difference is said [-]."""
 SOLE: Final = 0.5
 """Part of a foot's height, from below, whose outline is its footprint [-]."""
-STEEPEST: Final = 35.0
-"""Angle of repose of a sand of unknown friction, about the steepest there is [degrees]."""
 ROUNDING: Final = 0.01
 """Angle that is rounding [degrees]."""
 _UNITS: Final = {100.0: "centimetres", 1000.0: "millimetres"}
@@ -42,22 +42,26 @@ def gravity_doubts(model: mujoco.MjModel, sand: Sand) -> list[str]:
     ]
 
 
-def slope_doubts(model: mujoco.MjModel, sand: Sand, terrain: FreeSurface) -> list[str]:
+def slope_doubts(model: mujoco.MjModel, sand: Sand, terrain: "FreeSurface | Terrain") -> list[str]:
     """The doubt about sand too steep to lie, or about gravity that does not point along -z, if there is any."""
     gravity = np.array(model.opt.gravity)
     strength = float(np.linalg.norm(gravity))
     if strength == 0.0:
         return []
-    tilt, aside = (
-        float(np.degrees(np.arccos(np.clip(-gravity @ up / strength, -1.0, 1.0))))
-        for up in (np.array(terrain.normal), np.array([0.0, 0.0, 1.0]))
+    is_plane = isinstance(terrain, FreeSurface)
+    normals = np.array(terrain.normal) if isinstance(terrain, FreeSurface) else slope_normal(*terrain.slopes())
+    tilts, aside = (
+        np.degrees(np.arccos(np.clip(-up @ gravity / strength, -1.0, 1.0)))
+        for up in (normals, np.array([0.0, 0.0, 1.0]))
     )
-    repose = STEEPEST if sand.mu_int is None else float(np.degrees(np.arctan(sand.mu_int)))
+    tilt, repose = float(tilts.max()), math.degrees(sand.repose)
     if tilt > repose + ROUNDING:
         friction = "" if sand.mu_int is None else f" (mu_int {sand.mu_int:g})"
+        part = "" if is_plane else f"on {100.0 * float((tilts > repose).mean()):.2g} % of its area, "
         return [
-            f"the sand's surface is tilted by {tilt:.3g} degrees against gravity, beyond its angle of repose of "
-            f"{repose:.3g}{friction}: such sand flows, which the laws do not know. Make it flatter, or turn gravity"
+            f"the sand's surface is tilted by {'' if is_plane else 'up to '}{tilt:.3g} degrees against gravity, {part}"
+            f"beyond its angle of repose of {repose:.3g}{friction}: such sand flows, which the laws do not know. Make "
+            "it flatter, or turn gravity"
         ]
     if min(aside, tilt) > ROUNDING:
         return [
@@ -85,7 +89,7 @@ def sinkage_doubts(model: mujoco.MjModel, found: Standing, surfaces: Mapping[str
     ]
 
 
-def footprint_doubts(model: mujoco.MjModel, found: Standing, terrain: FreeSurface) -> list[str]:
+def footprint_doubts(model: mujoco.MjModel, found: Standing, terrain: "FreeSurface | Terrain") -> list[str]:
     """The doubt about feet of which much less collides than is seen, if there are any.
 
     Args:
@@ -110,7 +114,9 @@ def footprint_doubts(model: mujoco.MjModel, found: Standing, terrain: FreeSurfac
     ]
 
 
-def _footprint(model: mujoco.MjModel, data: mujoco.MjData, body: int, collides: bool, terrain: FreeSurface) -> float:
+def _footprint(
+    model: mujoco.MjModel, data: mujoco.MjData, body: int, collides: bool, terrain: "FreeSurface | Terrain"
+) -> float:
     """Area of the outline, from above, of the lower part of a body's geoms that collide, or of the others [m^2]."""
     can = colliding(model)
     corners = [_placed(model, data, geom) for geom in own_geoms(model, body) if bool(can[geom]) == collides]
@@ -120,9 +126,10 @@ def _footprint(model: mujoco.MjModel, data: mujoco.MjData, body: int, collides: 
     deepest = max(depth.max() for depth in depths)
     sole = deepest - SOLE * (deepest - min(depth.min() for depth in depths))
     low = [points[depth >= sole] for points, depth in zip(corners, depths, strict=True)]
+    normal = terrain.normal_at(*data.xpos[body][:2])
     if not collides:
-        return _outline(np.concatenate(low), terrain)
-    return sum(_outline(points, terrain) for points in low)  # as if none overlapped another: at most what is felt
+        return _outline(np.concatenate(low), normal)
+    return sum(_outline(points, normal) for points in low)  # as if none overlapped another: at most what is felt
 
 
 def _placed(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> Array:
@@ -131,11 +138,11 @@ def _placed(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> Array:
     return placed
 
 
-def _outline(points: Array, terrain: FreeSurface) -> float:
-    """Area of the convex hull of points seen along the terrain's normal [m^2]; zero of fewer than three."""
+def _outline(points: Array, normal: Array) -> float:
+    """Area of the convex hull of points seen along a normal [m^2]; zero of fewer than three."""
     import manifold3d  # not at start-up, where few models need it
 
-    flat = points @ np.linalg.svd(np.array([terrain.normal]))[2][1:].T
+    flat = points @ np.linalg.svd(normal[None])[2][1:].T
     return float(manifold3d.CrossSection.hull_points(np.ascontiguousarray(flat)).area())
 
 

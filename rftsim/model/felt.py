@@ -14,6 +14,7 @@ from rftsim.model.geometry import bounding_geoms, colliding, own_geoms
 from rftsim.model.reach import clearance
 from rftsim.model.shaping import Fineness, Shaping, shape
 from rftsim.sand.free_surface import FreeSurface
+from rftsim.sand.terrain import Terrain
 from rftsim.surface.triangles import Array, Surface
 
 CLEAR: Final = 0.1
@@ -31,7 +32,7 @@ class Choice(NamedTuple):
     """Which geoms bound them, and how."""
     plane: Array | None
     """Normal of the plane of motion under a planar law, shape (3,)."""
-    terrain: FreeSurface | None
+    terrain: "FreeSurface | Terrain | None"
     """Surface of the sand where bodies that cannot reach it are to be left out."""
 
 

@@ -8,33 +8,35 @@ import numpy as np
 
 from rftsim.model.draft import geom_of, shown
 from rftsim.model.geometry import colliding
+from rftsim.model.height_field import field_terrain
 from rftsim.model.start import standing_trees
-from rftsim.model.tops import LEVEL, Top, relief, top_at
+from rftsim.model.tops import LEVEL, POINTS, Top, top_at, top_points
 from rftsim.sand.free_surface import FreeSurface
+from rftsim.sand.terrain import Terrain
 from rftsim.surface.triangles import Array
 
 _GEOM = mujoco.mjtGeom
 FLUSH: Final = 0.02
 """Distance from the sand's surface, over the reach, within which a face counts as part of it."""
+ACROSS: Final = 9
+"""Places along each side of a geom at which its top is held against a terrain."""
 FEW: Final = 3
 """Names that a line tells before it counts the others."""
 
 
-class Ground(NamedTuple):
-    """The geom that a model stands on, and where its top lies."""
+class Support(NamedTuple):
+    """A geom whose place the sand takes, and the surface of its top."""
 
     geom: int
     """Id of the geom."""
-    terrain: FreeSurface
-    """The plane of its top where the model stands."""
-    relief: float
-    """Difference in height over the geom, which the plane leaves out [m]."""
+    terrain: "FreeSurface | Terrain"
+    """The plane of its top where the model stands, or the relief of a height field."""
 
 
 class Floors(NamedTuple):
     """Static geoms that would carry the bodies a second time, or hide the sand, by their names in the draft."""
 
-    terrain: FreeSurface
+    terrain: "FreeSurface | Terrain"
     """The sand's surface."""
     flush: float
     """Distance from it within which a face counts as part of it [m]."""
@@ -44,7 +46,7 @@ class Floors(NamedTuple):
     """Those that are only drawn in the sand's surface."""
 
 
-def find_ground(model: mujoco.MjModel, data: mujoco.MjData) -> Ground | None:
+def find_support(model: mujoco.MjModel, data: mujoco.MjData) -> Support | None:
     """Find the geom that a model's heaviest tree stands on at the start: the highest top below its centre of mass.
 
     Trees that can fall count first, and then those whose base is fixed. What is narrower than the tree carries it only
@@ -53,6 +55,9 @@ def find_ground(model: mujoco.MjModel, data: mujoco.MjData) -> Ground | None:
     Args:
         model: Compiled.
         data: Its data at the start, with kinematics and centres of mass.
+
+    Raises:
+        SceneError: It is a height field that is tilted.
     """
     candidates = _static(model, can_touch(model))
     moving = [body for body in range(1, model.nbody) if model.body_weldid[body] == body]
@@ -64,7 +69,7 @@ def find_ground(model: mujoco.MjModel, data: mujoco.MjData) -> Ground | None:
             wide = {geom: top for geom, top in below.items() if _radius(model, geom) >= _spread(model, data, root)}
             under = wide or below
             geom = max(under, key=lambda g: under[g].height) if under else min(tops, key=lambda g: tops[g].height)
-            return Ground(geom, _plane(tops[geom], place), relief(model, geom))
+            return Support(geom, _surface(model, data, geom, tops[geom], place))
     return None
 
 
@@ -79,8 +84,10 @@ def _spread(model: mujoco.MjModel, data: mujoco.MjData, root: int) -> float:
     return float(np.linalg.norm(own[:, :2] - data.subtree_com[root][:2], axis=1).max(initial=0.0))
 
 
-def _plane(top: Top, place: Array) -> FreeSurface:
-    """The plane through a top at a place."""
+def _surface(model: mujoco.MjModel, data: mujoco.MjData, geom: int, top: Top, place: Array) -> "FreeSurface | Terrain":
+    """The relief of a height field, or the plane through the top of another geom at a place."""
+    if model.geom_type[geom] == int(_GEOM.mjGEOM_HFIELD):
+        return field_terrain(model, data, geom)
     normal = np.where(np.abs(top.normal) < 1e-9, 0.0, top.normal)
     at = np.array([place[0], place[1], top.height])
     height = float(normal @ at / normal[2])
@@ -106,7 +113,7 @@ def _static(model: mujoco.MjModel, among: Any) -> list[int]:
     return np.flatnonzero(held[model.geom_bodyid] & among).tolist()
 
 
-def find_floors(model: mujoco.MjModel, data: mujoco.MjData, terrain: FreeSurface, reach: float) -> Floors:
+def find_floors(model: mujoco.MjModel, data: mujoco.MjData, terrain: "FreeSurface | Terrain", reach: float) -> Floors:
     """The floors of a model near the terrain.
 
     Planes and height fields are floors where they are nearer than the reach above or below it. Others have edges: those
@@ -119,21 +126,51 @@ def find_floors(model: mujoco.MjModel, data: mujoco.MjData, terrain: FreeSurface
         reach: Size of the largest body that feels the sand [m].
     """
     trees = standing_trees(model)
-    place = data.subtree_com[trees[0]] if trees else np.zeros(3)
+    start = data.subtree_com[trees[0]] if trees else np.zeros(3)
     endless = (_GEOM.mjGEOM_PLANE, _GEOM.mjGEOM_HFIELD)
     collides, flush, depths, drawn = colliding(model), FLUSH * reach, {}, []
     for geom in _static(model, np.ones(model.ngeom, dtype=bool)):
         kind, name = _GEOM(model.geom_type[geom]), model.geom(geom).name
-        at = place if kind == _GEOM.mjGEOM_PLANE else data.geom_xpos[geom]
-        top = top_at(model, data, geom, at)
-        if top is None:
+        at = start if kind == _GEOM.mjGEOM_PLANE else data.geom_xpos[geom]
+        points = top_points(model, data, geom, _places(terrain, at, _radius(model, geom)))
+        if not len(points):
             continue
-        depth = float(terrain.depth([at[0], at[1], top.height]))
-        if collides[geom] and abs(depth) <= reach and (kind in endless or depth >= -flush):
-            depths[name] = depth
-        elif not collides[geom] and abs(depth) <= flush and top.normal @ terrain.normal > 1.0 - 1e-6:
+        depth = terrain.depth(points)
+        nearest = float(depth[np.argmin(np.abs(depth))])
+        if collides[geom] and abs(nearest) <= reach and (kind in endless or depth.min() >= -flush):
+            depths[name] = nearest
+        elif not collides[geom] and np.abs(depth).max() <= flush and _parallel(model, data, geom, terrain, at):
             drawn.append(name)
     return Floors(terrain, flush, depths, drawn)
+
+
+def _places(terrain: "FreeSurface | Terrain", at: Array, radius: float) -> Array:
+    """Places over which a geom's top is held against the sand [m], shape (n, 3): of a plane one shows them all.
+
+    Args:
+        terrain: Surface of the sand.
+        at: The middle of them, shape (3,).
+        radius: How far the geom goes about it [m]; infinite for as far as the terrain does.
+    """
+    if isinstance(terrain, FreeSurface):
+        return at[None]
+    (x0, y0), (x1, y1) = terrain.window
+    if not np.isfinite(radius):
+        x, y = np.linspace(x0, x1, POINTS), np.linspace(y0, y1, POINTS)
+    else:
+        x, y = (np.linspace(c - radius, c + radius, ACROSS) for c in at[:2])
+    across = np.stack([*np.meshgrid(x, y), np.zeros((len(y), len(x)))], axis=-1).reshape(-1, 3)
+    return np.concatenate([at[None], across])
+
+
+def _parallel(
+    model: mujoco.MjModel, data: mujoco.MjData, geom: int, terrain: "FreeSurface | Terrain", at: Array
+) -> bool:
+    """Whether a geom's top is parallel to the sand in its middle; a height field, whose points were held to it, is."""
+    top = top_at(model, data, geom, at)
+    normal = terrain.normal_at(at[0], at[1])
+    is_field = model.geom_type[geom] == int(_GEOM.mjGEOM_HFIELD)
+    return is_field or (top is not None and bool(top.normal @ normal > 1.0 - 1e-6))
 
 
 def remove_floors(spec: mujoco.MjSpec, floors: Floors) -> int:
@@ -148,18 +185,33 @@ def remove_floors(spec: mujoco.MjSpec, floors: Floors) -> int:
     return len(pairs)
 
 
-def say_ground(ground: Ground | None, floors: Floors, pairs: int) -> list[str]:
-    """The line that says whose place the sand takes."""
+def say_ground(support: str | None, floors: Floors, pairs: int) -> list[str]:
+    """The line that says whose place the sand takes.
+
+    Args:
+        support: Name of the height field whose relief the sand takes, if it is one.
+        floors: The floors, which were removed.
+        pairs: How many contact pairs went with them.
+    """
     if not floors.depths:
         return []
-    terrain = floors.terrain
     many = len(floors.depths) > 1
     gone = "which no longer collide and are hidden" if many else "which no longer collides and is hidden"
     more = f", nor {'do' if pairs > 1 else 'does'} {pairs} contact pair{'s' if pairs > 1 else ''}" if pairs else ""
+    others = [name for name in floors.depths if name != support]
+    place = f"in the place of {_list(others)}"
+    if len(others) < len(floors.depths) and support is not None:
+        place = f"in the place and with the relief of {shown(support)}" + (f", and {place}" if others else "")
+    line = f"the sand lies at {_said(floors.terrain)}, {place}"
+    return [f"{line}, {gone}{more} (keep_floor=True keeps {'them' if many else 'it'})"]
+
+
+def _said(terrain: "FreeSurface | Terrain") -> str:
+    """The height of a surface in words."""
+    if isinstance(terrain, Terrain):
+        return f"z = {terrain.heights.min():.4g} to {terrain.heights.max():.4g} m"
     tilt = f", tilted by {np.degrees(np.arccos(terrain.normal[2])):.3g} degrees" if terrain.normal[2] < 1.0 else ""
-    flat = f", flat although that has {ground.relief:.3g} m of relief" if ground is not None and ground.relief else ""
-    place = f"the sand lies at z = {terrain.height:.6g} m{tilt}{flat}, in the place of {_list(floors.depths)}"
-    return [f"{place}, {gone}{more} (keep_floor=True keeps {'them' if many else 'it'})"]
+    return f"z = {terrain.height:.6g} m{tilt}"
 
 
 def floor_doubts(floors: Floors) -> list[str]:
@@ -196,7 +248,8 @@ def carrying(model: mujoco.MjModel, qpos: Array, floors: Floors) -> list[str]:
     static, found = set(_static(model, np.ones(model.ngeom, dtype=bool))) - set(gone), {}
     for contact in data.contact:
         pair = {int(g) for g in contact.geom}
-        if len(pair & static) != 1 or pair & set(gone) or abs(contact.frame[:3] @ terrain.normal) < LEVEL:
+        normal = terrain.normal_at(contact.pos[0], contact.pos[1])
+        if len(pair & static) != 1 or pair & set(gone) or abs(contact.frame[:3] @ normal) < LEVEL:
             continue
         (geom,), (other,) = pair & static, pair - static
         if model.body_weldid[model.geom_bodyid[other]] != 0 and terrain.depth(contact.pos) >= -floors.flush:

@@ -8,7 +8,10 @@ import mujoco
 import numpy as np
 
 from rftsim.errors import SceneError
+from rftsim.law import layout
 from rftsim.law.laws import LAWS, Law
+from rftsim.sand.free_surface import FreeSurface
+from rftsim.sand.terrain import Terrain
 from rftsim.surface.triangles import Array
 
 _JOINT = mujoco.mjtJoint
@@ -49,11 +52,37 @@ def check_planar(
     by = [
         f"its {_named(model, joint)}" if own else f"the {_named(model, joint)}{_of(model, joint)}" for joint in joints
     ]
-    normal = ", ".join(f"{x + 0.0:.3g}" for x in plane)
     raise SceneError(
-        f"{law.name} acts in the plane across ({normal}), and {_list(leaving)} can leave it by {_list(by)}: "
+        f"{law.name} acts in the plane across ({_said(plane)}), and {_list(leaving)} can leave it by {_list(by)}: "
         f"give {'it' if len(leaving) == 1 else 'them'} {_planar_joints(plane)}, or take {_law_in_space(law)}"
     )
+
+
+def plane_of(bed: Array, law: Law, terrain: "FreeSurface | Terrain") -> Array | None:
+    """The normal of the plane of motion of a planar law, shape (3,); None where the law is not planar.
+
+    Args:
+        bed: Packed sand.
+        law: The law of its force.
+        terrain: Surface of the sand.
+
+    Raises:
+        SceneError: The terrain rises across the plane, which a planar law knows nothing of.
+    """
+    if not law.planar:
+        return None
+    plane: Array = layout.record(bed, layout.BED).plane
+    if isinstance(terrain, FreeSurface):
+        return plane
+    along_x, along_y = terrain.slopes()
+    steepest = float(np.abs(plane[0] * along_x + plane[1] * along_y).max())
+    if steepest > SMALL:
+        raise SceneError(
+            f"{law.name} acts in the plane across ({_said(plane)}), and the terrain rises by up to "
+            f"{np.degrees(np.arctan(steepest)):.3g} degrees across it: take one that is the same all across, or "
+            f"{_law_in_space(law)}"
+        )
+    return plane
 
 
 def joints_that_leave(model: mujoco.MjModel, data: mujoco.MjData, body: int, plane: Array) -> list[int]:
@@ -137,3 +166,7 @@ def _law_in_space(law: Law) -> str:
     """The 3D law that is to a planar one what there is."""
     name = law.name.replace("2d", "3d")
     return name if name in LAWS and name != law.name else "a 3D law"
+
+
+def _said(normal: Array) -> str:
+    return ", ".join(f"{x + 0.0:.3g}" for x in normal)

@@ -1,13 +1,14 @@
 """The reach of a model's bodies as their joints let them go: orientations, motions, nearness to the sand."""
 
 import math
-from typing import Final
+from typing import Final, NamedTuple
 
 import mujoco
 import numpy as np
 
-from rftsim.reduction.samples import POSES, Reach, free_reach, middle
+from rftsim.reduction.samples import POSES, Reach, free_reach, middle, turned_by
 from rftsim.sand.free_surface import FreeSurface
+from rftsim.sand.terrain import Terrain
 from rftsim.surface.triangles import Array, Surface
 
 _JOINT = mujoco.mjtJoint
@@ -15,14 +16,38 @@ GIVE: Final = 0.05
 """Share of its range by which a joint may pass its limits, which are soft."""
 
 
-def sampled_reach(model: mujoco.MjModel, body: int, surface: Surface, seed: int) -> Reach:
-    """Orientations and motions of a body at joint positions drawn within their ranges.
+class Slopes(NamedTuple):
+    """The slopes on which a body may stand, in whose frame it is seen: there the sand is level."""
+
+    steepest: float = 0.0
+    """The steepest of them [rad]."""
+    across: Array | None = None
+    """The axis about which all of them lean, shape (3,): the normal of a plane of motion; None for any heading."""
+
+
+LEVEL: Final = Slopes()
+"""The one slope of a plane, in whose frame it is level."""
+
+
+def slopes_of(terrain: "FreeSurface | Terrain", plane: Array | None) -> Slopes:
+    """The slopes that a surface has, or may have where it is moved in place.
+
+    Args:
+        terrain: Surface of the sand.
+        plane: Normal of the plane of motion, shape (3,); None where the bodies move in space.
+    """
+    return LEVEL if isinstance(terrain, FreeSurface) else Slopes(terrain.steepest, plane)
+
+
+def sampled_reach(model: mujoco.MjModel, body: int, surface: Surface, seed: int, slopes: Slopes = LEVEL) -> Reach:
+    """Orientations and motions of a body at joint positions drawn within their ranges, on slopes drawn among some.
 
     Args:
         model: Compiled.
         body: The body's id.
         surface: Its surface.
-        seed: Seed of the joint positions.
+        seed: Seed of the joint positions and of the slopes.
+        slopes: Slopes of the sand, which the orientations and motions are relative to.
     """
     if _hangs_on_nothing(model, body):
         return free_reach(seed)
@@ -40,7 +65,21 @@ def sampled_reach(model: mujoco.MjModel, body: int, surface: Surface, seed: int)
     scaled = jacobians.reshape(POSES, 6, -1) * np.repeat([1.0, surface.size / 2], 3)[:, None]
     basis, share, _ = np.linalg.svd(scaled, full_matrices=False)
     basis = basis * (share > 1e-9 * share[:, :1])[:, None]
-    return Reach(turn, basis @ basis.transpose(0, 2, 1))
+    reach = Reach(turn, basis @ basis.transpose(0, 2, 1))
+    return _leaned(reach, slopes, rng) if slopes.steepest > 0.0 else reach
+
+
+def _leaned(reach: Reach, slopes: Slopes, rng: np.random.Generator) -> Reach:
+    """The orientations and motions as they are seen from slopes, one for each: evenly steep, of any heading."""
+    heading = rng.uniform(-math.pi, math.pi, size=POSES)
+    axis = np.column_stack([-np.sin(heading), np.cos(heading), np.zeros(POSES)])
+    if slopes.across is not None:
+        axis = np.sign(heading)[:, None] * slopes.across
+    half = rng.uniform(0.0, slopes.steepest / 2, size=(POSES, 1))
+    lean = turned_by(np.hstack([np.cos(half), np.sin(half) * axis]))
+    both = np.zeros((POSES, 6, 6))
+    both[:, :3, :3] = both[:, 3:, 3:] = lean
+    return Reach(lean @ reach.rotations, both @ reach.motions @ both.transpose(0, 2, 1))
 
 
 def _hangs_on_nothing(model: mujoco.MjModel, body: int) -> bool:
@@ -79,8 +118,10 @@ def _quaternions(largest: float | None, rng: np.random.Generator) -> Array:
     return np.hstack([np.cos(half), np.sin(half) * axis])
 
 
-def clearance(model: mujoco.MjModel, body: int, surface: Surface, terrain: FreeSurface) -> float:
+def clearance(model: mujoco.MjModel, body: int, surface: Surface, terrain: "FreeSurface | Terrain") -> float:
     """A height over the sand that a body cannot come below, by its tree and its joints' ranges [m]; or -inf.
+
+    Of a terrain counts the highest point, wherever it lies.
 
     Along the way from the world, a slide lowers what hangs on it by its range, and a hinge that is not upright, or a
     ball, may turn it about its anchor any way: less than what the joints allow is never assumed.
@@ -88,8 +129,9 @@ def clearance(model: mujoco.MjModel, body: int, surface: Surface, terrain: FreeS
     chain = [body]
     while chain[-1] != 0:
         chain.append(int(model.body_parentid[chain[-1]]))
-    height = -float(terrain.depth(np.zeros(3)))
-    tilt: Array | None = np.array(terrain.normal)
+    plane = terrain.ceiling
+    height = -float(plane.depth(np.zeros(3)))
+    tilt: Array | None = np.array(plane.normal)
     """Up in the frame so far; None where a joint may have turned it any way."""
 
     def along(vector: Array) -> float:

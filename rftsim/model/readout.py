@@ -7,11 +7,17 @@ import mujoco
 import numpy as np
 
 from rftsim.engine import seal
-from rftsim.engine.block import BODY_MARKER, MORE_MARKER, SAND_MARKER, read_block
+from rftsim.engine.block import (
+    BODY_MARKER,
+    MORE_MARKER,
+    MORE_TERRAIN_MARKER,
+    SAND_MARKER,
+    TERRAIN_MARKER,
+    read_block,
+)
 from rftsim.errors import SceneError
 from rftsim.law import evaluate, layout
 from rftsim.model.stale import fingerprint, tell_stale
-from rftsim.model.write import DRAWING_MARKER
 from rftsim.surface.triangles import Array
 
 
@@ -55,6 +61,13 @@ class Instance(NamedTuple):
     """Its sand as numbers, see `bed`; a view of the model's numeric_data."""
     bodies: dict[int, Array]
     """Packed surface of each body that feels it, by body id; a view."""
+    relief: Array | None = None
+    """Its packed terrain, where its surface is no plane; a view, whose place and heights may be changed in place."""
+
+    @property
+    def whole(self) -> Array:
+        """Its sand and its terrain as packed numbers, see `layout.pack_bed`."""
+        return self.packed if self.relief is None else np.concatenate([self.packed, self.relief])
 
     @property
     def bed(self) -> Any:
@@ -87,24 +100,17 @@ def _instance(model: mujoco.MjModel, by_name: dict[str, int], instance: int, bod
     name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_PLUGIN, instance) or ""
     marked = _marked(by_name, SAND_MARKER, name)
     numbers = None if marked is None else _numeric(model, by_name[marked])
-    if marked is None or numbers is None or numbers.size != seal.BED_NUMBERS + seal.SEAL_NUMBERS:
+    if marked is None or numbers is None or numbers.size != layout.BED_NUMBERS + seal.SEAL_NUMBERS:
         raise SceneError(f"the model lacks the numbers of its bed {name!r}: make it anew with rftsim.add_sand")
-    packed, behind = numbers[: seal.BED_NUMBERS], numbers[seal.BED_NUMBERS :]
+    packed, behind = numbers[: layout.BED_NUMBERS], numbers[layout.BED_NUMBERS :]
     if not any(seal.is_sealed(packed[seal.SEALED], behind, own) for own in seal.own_names(name, behind)):
         raise SceneError(f"the law of bed {name!r}, or its numbers' place, was changed: make the model anew")
-    return Instance(instance, name, int(model.numeric_adr[by_name[marked]]), packed, bodies)
-
-
-def sand_planes(model: mujoco.MjModel) -> list[int]:
-    """Ids of the geoms that draw the surfaces of a model's beds."""
-    names = {bed.name for bed in instances(model)}
-    return [geom for geom in range(model.ngeom) if _drawn_bed(model.geom(geom).name) in names]
-
-
-def _drawn_bed(geom: str) -> str | None:
-    """The name of the bed that a geom of this name draws, if any; what a model was attached under may stand around."""
-    before, marker, after = geom.rpartition(DRAWING_MARKER)
-    return before + after if marker else None
+    relief = None
+    if layout.record(packed, layout.BED).relief:
+        relief = _relief(model, by_name, name)
+        if relief is None:
+            raise SceneError(f"the model lacks the terrain of its bed {name!r}: make it anew with rftsim.add_sand")
+    return Instance(instance, name, int(model.numeric_adr[by_name[marked]]), packed, bodies, relief)
 
 
 def _marked(by_name: dict[str, int], marker: str, owner: str) -> str | None:
@@ -119,16 +125,35 @@ def _numeric(model: mujoco.MjModel, i: int) -> Array:
     return view
 
 
-def _surface(model: mujoco.MjModel, by_name: dict[str, int], owner: str) -> Array | None:
-    """The packed surface of a body, which goes on behind its first numeric; None where it has none."""
-    first = _marked(by_name, BODY_MARKER, owner)
+def _going_on(model: mujoco.MjModel, by_name: dict[str, int], marker: str, more: str, owner: str) -> Array | None:
+    """The numbers of an owner that go on behind its first numeric, seal and all; None where it has none."""
+    first = _marked(by_name, marker, owner)
     if first is None:
         return None
     i = by_name[first]
-    places = [k for k in range(len(owner) + 1) if owner[:k] + BODY_MARKER + owner[k:] == first]
-    end = max(_end(by_name, i, owner[:k], owner[k:]) for k in places)
+    places = [k for k in range(len(owner) + 1) if owner[:k] + marker + owner[k:] == first]
+    end = max(_end(by_name, i, owner[:k] + more, owner[k:]) for k in places)
     start, size = max(int(model.numeric_adr[i]), 0), int(model.numeric_size[i:end].sum())
     numbers: Array = model.numeric_data[start : start + max(size, 0)]
+    return numbers
+
+
+def _relief(model: mujoco.MjModel, by_name: dict[str, int], owner: str) -> Array | None:
+    """The packed terrain of a bed; None where it has none, or it is not whole."""
+    numbers = _going_on(model, by_name, TERRAIN_MARKER, MORE_TERRAIN_MARKER, owner)
+    size = 0 if numbers is None else numbers.size - seal.SEAL_NUMBERS
+    if numbers is None or size < layout.TERRAIN_NUMBERS:
+        return None
+    head = layout.record(numbers, layout.TERRAIN)
+    fits = 2.0 <= head.rows <= size and 2.0 <= head.columns <= size and layout.terrain_size(head) == size
+    return numbers[:size] if fits else None
+
+
+def _surface(model: mujoco.MjModel, by_name: dict[str, int], owner: str) -> Array | None:
+    """The packed surface of a body; None where it has none."""
+    numbers = _going_on(model, by_name, BODY_MARKER, MORE_MARKER, owner)
+    if numbers is None:
+        return None
     size = numbers.size - seal.SEAL_NUMBERS
     header = layout.record(numbers, layout.HEADER) if size > layout.HEADER_NUMBERS else None
     if header is None or not 1.0 <= header.ntri <= size or layout.packed_size(header) != size:
@@ -137,9 +162,9 @@ def _surface(model: mujoco.MjModel, by_name: dict[str, int], owner: str) -> Arra
 
 
 def _end(by_name: dict[str, int], i: int, before: str, after: str) -> int:
-    """The numeric behind those of a surface that starts at i, with so much of its owner's name on both sides."""
+    """The numeric behind those of what starts at i and goes on, with so much of its names on both sides of a number."""
     end = i + 1
-    while by_name.get(f"{before}{MORE_MARKER}{end - i}:{after}") == end:
+    while by_name.get(f"{before}{end - i}:{after}") == end:
         end += 1
     return end
 
@@ -190,7 +215,7 @@ def tractions(model: mujoco.MjModel, data: mujoco.MjData, body: "int | str") -> 
     velocity, omega = body_velocities(model, data)
     rotation = data.xmat[index].reshape(3, 3)
     stress, depth = evaluate.triangle_stresses(
-        bed.packed, surface, data.xpos[index], data.xmat[index], velocity[index], omega[index]
+        bed.whole, surface, data.xpos[index], data.xmat[index], velocity[index], omega[index]
     )
     *columns, area = layout.read_columns(surface)
     centre, normal = np.array(columns[:3]).T, np.array(columns[3:]).T
@@ -208,7 +233,7 @@ def _check_seal(model: mujoco.MjModel, bed: Instance, body: int) -> None:
     """Refuse a surface of which a number was changed."""
     owner, surface, numbers = model.body(body).name, bed.bodies[body], model.numeric_data
     start = (surface.ctypes.data - numbers.ctypes.data) // 8 + surface.size
-    behind, of_bed = numbers[start : start + seal.SEAL_NUMBERS], numbers[bed.start + seal.BED_NUMBERS :]
+    behind, of_bed = numbers[start : start + seal.SEAL_NUMBERS], numbers[bed.start + layout.BED_NUMBERS :]
     names = (own + name for own in seal.own_names(owner, behind) for name in seal.own_names(bed.name, of_bed))
     if not any(seal.is_sealed(surface, behind, name) for name in names):
         raise SceneError(f"the surface of body {owner!r} was changed in the model: make it anew with rftsim.add_sand")

@@ -1,5 +1,7 @@
 """Tops of static geoms: the faces, level or sloped, that a body could stand on, as heights over places."""
 
+import functools
+from collections.abc import Callable
 from typing import Final, NamedTuple
 
 import mujoco
@@ -7,6 +9,7 @@ import numpy as np
 
 from rftsim.errors import SurfaceError
 from rftsim.model.geometry import hull_triangles
+from rftsim.model.height_field import field_heights
 from rftsim.surface.triangles import Array
 
 _GEOM = mujoco.mjtGeom
@@ -14,6 +17,8 @@ LEVEL: Final = 0.82
 """Cosine of the tilt from which on a face is a wall: 35 degrees, about the steepest that sand lies."""
 FLAT: Final = (_GEOM.mjGEOM_PLANE, _GEOM.mjGEOM_BOX, _GEOM.mjGEOM_CYLINDER, _GEOM.mjGEOM_MESH, _GEOM.mjGEOM_HFIELD)
 """Kinds of geoms that have a top to stand on; round ones are obstacles."""
+POINTS: Final = 33
+"""Most points along a side of a height field that are looked at."""
 
 
 class Top(NamedTuple):
@@ -34,26 +39,49 @@ def top_at(model: mujoco.MjModel, data: mujoco.MjData, geom: int, place: Array) 
         geom: The geom's id.
         place: World frame [m], of which x and y count, shape (3,).
     """
+    return _tops(model, data, geom)(place)
+
+
+def _tops(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> Callable[[Array], Top | None]:
+    """What gives the top of a geom over a place; arguments as of `top_at`."""
     kind = _GEOM(model.geom_type[geom])
     if kind not in FLAT:
-        return None
+        return lambda place: None
     rotation, origin = data.geom_xmat[geom].reshape(3, 3), data.geom_xpos[geom]
     if kind == _GEOM.mjGEOM_HFIELD:
-        return _field_top(model, geom, rotation, origin, place)
+        return functools.partial(_field_top, model, geom, rotation, origin)
     try:
         normals, offsets = _halfspaces(model, geom, kind)
     except SurfaceError:  # a flat mesh, which carries nothing in MuJoCo
-        return None
+        return lambda place: None
     normals, offsets = normals @ rotation.T, offsets + normals @ rotation.T @ origin
-    return _upper(normals, offsets, place)
+    return functools.partial(_upper, normals, offsets)
 
 
-def relief(model: mujoco.MjModel, geom: int) -> float:
-    """The difference between the highest and the lowest point of a height field [m]; zero of other geoms."""
+def top_points(model: mujoco.MjModel, data: mujoco.MjData, geom: int, places: Array) -> Array:
+    """Points of a geom's top over places where it has one; of a height field those of its own grid; shape (n, 3) [m].
+
+    Args:
+        model: Compiled.
+        data: Its data after mj_kinematics.
+        geom: The geom's id.
+        places: World frame [m], of which x and y count, shape (n, 3).
+    """
     if model.geom_type[geom] != int(_GEOM.mjGEOM_HFIELD):
-        return 0.0
-    heights = _field(model, int(model.geom_dataid[geom]))
-    return float(np.ptp(heights))
+        tops = map(_tops(model, data, geom), places)
+        found = [[*place[:2], top.height] for place, top in zip(places, tops, strict=True) if top is not None]
+        return np.array(found).reshape(-1, 3)
+    field, rotation = int(model.geom_dataid[geom]), data.geom_xmat[geom].reshape(3, 3)
+    if rotation[2, 2] < LEVEL:
+        return np.empty((0, 3))
+    heights, half = field_heights(model, field), model.hfield_size[field][:2]
+    row, column = (np.unique(np.linspace(0, n - 1, min(n, POINTS)).round().astype(int)) for n in heights.shape)
+    x, y = (
+        end * (2.0 * at / (n - 1) - 1.0) for end, at, n in zip(half, (column, row), heights.shape[::-1], strict=True)
+    )
+    grid = np.stack([*np.meshgrid(x, y), heights[np.ix_(row, column)]], axis=-1).reshape(-1, 3)
+    points: Array = grid @ rotation.T + data.geom_xpos[geom]
+    return points
 
 
 def _halfspaces(model: mujoco.MjModel, geom: int, kind: mujoco.mjtGeom) -> tuple[Array, Array]:
@@ -73,13 +101,6 @@ def _halfspaces(model: mujoco.MjModel, geom: int, kind: mujoco.mjtGeom) -> tuple
     return normals, np.einsum("ij,ij->i", normals, corners[:, 0])
 
 
-def _field(model: mujoco.MjModel, field: int) -> Array:
-    """Heights of a height field over its origin [m], shape (nrow, ncol)."""
-    rows, columns, start = model.hfield_nrow[field], model.hfield_ncol[field], model.hfield_adr[field]
-    heights = model.hfield_data[start : start + rows * columns].reshape(rows, columns).astype(float)
-    return heights * float(model.hfield_size[field][2])  # type: ignore[no-any-return]
-
-
 def _field_top(model: mujoco.MjModel, geom: int, rotation: Array, origin: Array, place: Array) -> Top | None:
     """The top of a height field, whose heights are taken at the nearest of its points."""
     field = int(model.geom_dataid[geom])
@@ -87,7 +108,7 @@ def _field_top(model: mujoco.MjModel, geom: int, rotation: Array, origin: Array,
     along = (rotation.T @ [place[0] - origin[0], place[1] - origin[1], 0.0])[:2]
     if (np.abs(along) > half).any() or rotation[2, 2] < LEVEL:
         return None
-    heights = _field(model, field)
+    heights = field_heights(model, field)
     column, row = np.rint((along + half) / (2.0 * half) * (np.array(heights.shape[::-1]) - 1)).astype(int)
     return Top(float(origin[2] + heights[row, column]), rotation[:, 2].copy())
 

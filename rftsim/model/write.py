@@ -1,29 +1,16 @@
-"""The MJCF elements of a bed of sand: the plugin and the numbers that carry it, its sensors, and how it is drawn."""
+"""The MJCF elements of a bed of sand: the plugin and the numbers that carry it, and its sensors."""
 
-import math
 from collections.abc import Iterable, Mapping
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 import mujoco
 
 from rftsim.engine import block as engine
 from rftsim.engine import seal
+from rftsim.engine.plugin import RUTS
 from rftsim.errors import SceneError
-from rftsim.sand.free_surface import FreeSurface
+from rftsim.law.layout import BED, BED_NUMBERS, record, ruts_size
 from rftsim.surface.triangles import Array
-
-SAND_RGBA: Final = (1.0, 1.0, 1.0, 0.75)
-"""Colour by which the texture of the drawn sand is multiplied, and its opacity."""
-GRAIN_RGB: Final = ((0.60, 0.52, 0.39), (0.45, 0.385, 0.285))
-"""Colours of the drawn sand and of the grains on it."""
-GRAIN_SIZE: Final = 0.001
-"""Side of a pixel of the drawn sand [m]."""
-PIXELS: Final = 256
-"""Side of its texture, which repeats [pixels]."""
-SHINE: Final = 0.2
-"""Light that the drawn sand gives off itself."""
-DRAWING_MARKER: Final = "_surface"
-"""End of the name of the geom, texture and material that draw a bed; its name stands before."""
 
 
 class Carrier(NamedTuple):
@@ -54,37 +41,38 @@ def check_sensors(spec: mujoco.MjSpec, bodies: Iterable[str]) -> None:
         raise SceneError(f"the model has a sensor {min(taken)!r} already: rename it, or pass sensors=False")
 
 
-def check_drawing(spec: mujoco.MjSpec, name: str) -> None:
-    """Refuse a bed whose drawing would have the name of something else.
-
-    Raises:
-        SceneError: The model has a geom, texture or material of that name.
-    """
-    for kind, elements in (("geom", spec.geoms), ("texture", spec.textures), ("material", spec.materials)):
-        if _drawing(name) in {element.name for element in elements}:
-            raise SceneError(f"the model has a {kind} {_drawing(name)!r} already: rename it, or pass draw=False")
-
-
 def write_bed(spec: mujoco.MjSpec, carrier: Carrier, bed: Array, surfaces: Mapping[str, Array]) -> None:
     """Put a bed of sand and the surfaces of bodies into a spec.
 
     Args:
         spec: The model; every body that feels the sand has its name.
         carrier: The plugin instance that is made.
-        bed: Packed sand.
+        bed: Packed sand, with its terrain where it has one.
         surfaces: Packed surface of each body that feels the sand, by body name.
     """
     spec.activate_plugin(carrier.plugin)
-    spec.add_plugin(name=carrier.name, plugin_name=carrier.plugin, active=True)
-    numbers = seal.sealed_bed(bed, carrier.name)
-    spec.add_numeric(name=engine.SAND_MARKER + carrier.name, data=numbers, size=numbers.size)
+    own, terrain = bed[:BED_NUMBERS], bed[BED_NUMBERS:]
+    size = int(ruts_size(record(own, BED)))
+    instance = spec.add_plugin(name=carrier.name, plugin_name=carrier.plugin, active=True)
+    if size:
+        instance.config = {RUTS: str(size)}
+    _write(spec, engine.SAND_MARKER, "", carrier.name, seal.sealed_bed(own, carrier.name))
+    if terrain.size:
+        numbers = seal.sealed_terrain(terrain, carrier.name)
+        _write(spec, engine.TERRAIN_MARKER, engine.MORE_TERRAIN_MARKER, carrier.name, numbers)
     for body, data in surfaces.items():
         _attach(spec.body(body).plugin, carrier)
-        numbers = seal.sealed_surface(data, body, carrier.name)
-        for first in range(0, numbers.size, engine.CHUNK):
-            chunk = numbers[first : first + engine.CHUNK]
-            marker = f"{engine.MORE_MARKER}{first // engine.CHUNK}:" if first else engine.BODY_MARKER
-            spec.add_numeric(name=marker + body, data=chunk, size=chunk.size)
+        _write(
+            spec, engine.BODY_MARKER, engine.MORE_MARKER, body, seal.sealed_surface(data, body, carrier.name)
+        )  # fmt: skip
+
+
+def _write(spec: mujoco.MjSpec, marker: str, more: str, owner: str, numbers: Array) -> None:
+    """Put numbers into numerics that are named after their owner, the first by a marker and the others by another."""
+    for first in range(0, numbers.size, engine.CHUNK):
+        chunk = numbers[first : first + engine.CHUNK]
+        name = (f"{more}{first // engine.CHUNK}:" if first else marker) + owner
+        spec.add_numeric(name=name, data=chunk, size=chunk.size)
 
 
 def write_sensors(spec: mujoco.MjSpec, carrier: Carrier, bodies: Iterable[str]) -> None:
@@ -96,51 +84,8 @@ def write_sensors(spec: mujoco.MjSpec, carrier: Carrier, bodies: Iterable[str]) 
         _attach(sensor.plugin, carrier)
 
 
-def write_drawing(spec: mujoco.MjSpec, name: str, terrain: FreeSurface) -> None:
-    """Draw the surface of a bed of sand as a plane of grains, which collides with nothing and lets what is buried show.
-
-    The grains are noise, which far away becomes an even colour; they shine a little, so that sand looks like sand
-    under a model's own lights, whatever these are.
-    """
-    normal, drawing = terrain.normal, _drawing(name)
-    half = 0.5 * math.acos(min(normal[2], 1.0))
-    length = math.hypot(normal[0], normal[1]) or 1.0
-    quat = [math.cos(half), -math.sin(half) * normal[1] / length, math.sin(half) * normal[0] / length, 0.0]
-    spec.add_texture(
-        name=drawing,
-        type=mujoco.mjtTexture.mjTEXTURE_2D,
-        builtin=mujoco.mjtBuiltin.mjBUILTIN_FLAT,
-        mark=mujoco.mjtMark.mjMARK_RANDOM,
-        random=0.35,
-        rgb1=GRAIN_RGB[0],
-        markrgb=GRAIN_RGB[1],
-        width=PIXELS,
-        height=PIXELS,
-    )
-    repeat = 1.0 / (PIXELS * GRAIN_SIZE)
-    grains = spec.add_material(
-        name=drawing, texrepeat=[repeat, repeat], texuniform=True, emission=SHINE, specular=0.0, shininess=0.0
-    )
-    grains.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = drawing
-    spec.worldbody.add_geom(
-        name=drawing,
-        type=mujoco.mjtGeom.mjGEOM_PLANE,
-        size=[0, 0, 0.1],
-        pos=[0, 0, terrain.height],
-        quat=quat,
-        contype=0,
-        conaffinity=0,
-        material=drawing,
-        rgba=SAND_RGBA,
-    )
-
-
 def _sensor(body: str) -> str:
     return f"{body}_sand"
-
-
-def _drawing(bed: str) -> str:
-    return bed + DRAWING_MARKER
 
 
 def _attach(plugin: Any, carrier: Carrier) -> None:

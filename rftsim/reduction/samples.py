@@ -57,7 +57,11 @@ def free_reach(seed: int) -> Reach:
 def turned_any_way(count: int, rng: np.random.Generator) -> Array:
     """Rotations drawn evenly among all, shape (count, 3, 3)."""
     quaternions = rng.normal(size=(count, 4))
-    quaternions /= np.linalg.norm(quaternions, axis=1, keepdims=True)
+    return turned_by(quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True))
+
+
+def turned_by(quaternions: Array) -> Array:
+    """The rotations of unit quaternions, shape (n, 4), as matrices, (n, 3, 3)."""
     w, vector = quaternions[:, 0, None, None], quaternions[:, 1:]
     cross = np.cross(vector[:, None], np.eye(3)[None]).transpose(0, 2, 1)  # cross @ a = vector x a
     turned: Array = np.eye(3) + 2 * w * cross + 2 * cross @ cross

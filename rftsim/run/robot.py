@@ -6,6 +6,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
+from rftsim.model.ground import ground
 from rftsim.model.readout import instances, wrenches
 from rftsim.model.standing import moving_weight, sinkage
 from rftsim.surface.triangles import Array
@@ -23,7 +24,7 @@ class Robot(NamedTuple):
     weight: float
     """The weight of everything that can move [N]."""
     carried: float
-    """The sand's force along its normal over this weight; NaN without weight."""
+    """The sand's force against gravity over this weight; NaN without weight."""
 
 
 def trunk(model: mujoco.MjModel, felt: Sequence[int]) -> str:
@@ -52,14 +53,13 @@ def measure(model: mujoco.MjModel, data: mujoco.MjData, body: str, lift: float |
         model: Compiled, with sand.
         data: Its data after mj_forward or mj_step.
         body: Name of its trunk.
-        lift: The sand's force on it along the normal [N]; by default that of the moment.
+        lift: The sand's force on it against gravity [N]; by default that of the moment.
     """
-    bed = instances(model)[0].bed
     weight = moving_weight(model)
-    lift = float(total_force(model, data) @ bed.up) if lift is None else lift
+    lift = against_gravity(model, total_force(model, data)) if lift is None else lift
     return Robot(
         body,
-        float(bed.up @ data.body(body).xpos - bed.offset),
+        -float(ground(model, data).depth(data.body(body).xpos)),
         {name: depth for name, depth in sinkages(model, data).items() if depth > 0.0},
         weight,
         lift / weight if weight > 0.0 else float("nan"),
@@ -69,7 +69,7 @@ def measure(model: mujoco.MjModel, data: mujoco.MjData, body: str, lift: float |
 def sinkages(model: mujoco.MjModel, data: mujoco.MjData) -> dict[str, float]:
     """Sinkage of each body that feels the sand, by body name, the deepest first [m]; negative above the sand."""
     found = {
-        model.body(body).name: sinkage(bed.packed, surface, data.xpos[body], data.xmat[body])
+        model.body(body).name: sinkage(ground(model, data, bed.name), surface, data.xpos[body], data.xmat[body])
         for bed in instances(model)
         for body, surface in bed.bodies.items()
     }
@@ -80,3 +80,9 @@ def total_force(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
     """The sand's force on all bodies together [N], shape (3,)."""
     total: Array = wrenches(model, data).force.sum(axis=0)
     return total
+
+
+def against_gravity(model: mujoco.MjModel, force: Array) -> float:
+    """The part of a force that holds up a weight [N]: against gravity, or along z where there is none."""
+    strength = float(np.linalg.norm(model.opt.gravity))
+    return -float(force @ model.opt.gravity) / strength if strength > 0.0 else float(force[2])

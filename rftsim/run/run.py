@@ -9,8 +9,9 @@ import mujoco
 import numpy as np
 
 from rftsim.errors import RftsimError
+from rftsim.model.ground import ground
 from rftsim.model.readout import work, wrenches
-from rftsim.run.robot import Robot, measure, sinkages
+from rftsim.run.robot import Robot, against_gravity, measure, sinkages
 from rftsim.run.scenes import Staged
 from rftsim.run.start import begin
 from rftsim.run.validity import Validity, validity
@@ -123,7 +124,7 @@ def steps(staged: Staged) -> Generator[mujoco.MjData, None, Run]:
 
 def _row(staged: Staged, data: mujoco.MjData) -> tuple[Any, ...]:
     """The measurements of one moment, in the order of `History`."""
-    model, terrain, measured = staged.model, staged.bed.terrain, staged.measured
+    model, measured = staged.model, staged.measured
     body = model.body(measured.body).id
     wrench = wrenches(model, data)
     velocity = np.empty(6)
@@ -132,11 +133,12 @@ def _row(staged: Staged, data: mujoco.MjData) -> tuple[Any, ...]:
         deepest = next(iter(sinkages(model, data).values()))
         speed = math.hypot(velocity[3], velocity[4])
         return data.time, speed, deepest, velocity[1], wrench.force.sum(axis=0), float(wrench.power.sum())
-    below = measured.wheel_radius
-    if below is None:
-        corners = staged.bed.surfaces[measured.body].corners
-        below = -float((corners @ data.xmat[body].reshape(3, 3).T @ np.asarray(terrain.normal)).min())
-    sinkage = below + float(terrain.depth(data.xpos[body]))
+    surface = ground(model, data, staged.bed.name)
+    if measured.wheel_radius is not None:
+        sinkage = measured.wheel_radius + float(surface.depth(data.xpos[body]))
+    else:
+        corners = staged.bed.surfaces[measured.body].corners @ data.xmat[body].reshape(3, 3).T + data.xpos[body]
+        sinkage = float(surface.depth(corners).max())
     return data.time, velocity[3], sinkage, velocity[1], wrench.force[body].copy(), float(wrench.power.sum())
 
 
@@ -144,7 +146,7 @@ def _robot(staged: Staged, data: mujoco.MjData, history: History) -> Robot | Non
     """The measures of a robot at the end of its run."""
     if not staged.measured.robot:
         return None
-    lift = float(history.force[_last(history)].mean(axis=0) @ np.asarray(staged.bed.terrain.normal))
+    lift = against_gravity(staged.model, history.force[_last(history)].mean(axis=0))
     return measure(staged.model, data, staged.measured.body, lift)
 
 

@@ -1,16 +1,31 @@
-"""The free surface: what bounds the sand from above."""
+"""The free surface: what bounds the sand from above, as a plane."""
 
 import dataclasses
 import math
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+
+class GroundLike(Protocol):
+    """A free surface, of whatever kind, that is asked for heights, normals and depths."""
+
+    def depth(self, points: ArrayLike) -> Any:
+        """Depth of points below the surface along its normal [m], positive in the sand; points [m], (3,) or (n, 3)."""
+
+    def height_at(self, x: ArrayLike, y: ArrayLike) -> Any:
+        """Height of the surface over places [m]; x and y [m] of any one shape."""
+
+    def normal_at(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """Upward unit normal of the surface over places, shape (..., 3); x and y [m] of any one shape."""
 
 
 @dataclasses.dataclass(frozen=True)
 class FreeSurface:
-    """The plane that bounds the sand from above: the terrain of a scene.
+    """A plane that bounds the sand from above; `Terrain` is a surface of any height.
 
     Depth and the laws' "up" follow the normal. RFT was measured and fitted on level ground: on slopes it is
     uncalibrated.
@@ -38,6 +53,11 @@ class FreeSurface:
         """The product of the normal and any point on the surface, normal . x [m]."""
         return self.height * self.normal[2]
 
+    @property
+    def ceiling(self) -> "FreeSurface":
+        """A plane that no point of the surface lies above: itself."""
+        return self
+
     def depth(self, points: ArrayLike) -> Any:
         """Depth of points below the surface along its normal [m], positive in the sand.
 
@@ -48,3 +68,19 @@ class FreeSurface:
             A number, or an array of shape (n,).
         """
         return self.offset - np.dot(points, self.normal)
+
+    def height_at(self, x: ArrayLike, y: ArrayLike) -> Any:
+        """Height of the surface over places [m]; x and y [m] of any one shape."""
+        across = np.multiply(x, self.normal[0]) + np.multiply(y, self.normal[1])
+        return self.height - across / self.normal[2]
+
+    def normal_at(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """Upward unit normal of the surface over places, shape (..., 3); x and y [m] of any one shape."""
+        return np.broadcast_to(np.array(self.normal), (*np.broadcast_shapes(np.shape(x), np.shape(y)), 3))
+
+
+def slope_normal(along_x: ArrayLike, along_y: ArrayLike) -> Array:
+    """Upward unit normal of a surface that rises by slopes along x and y [-], shape (..., 3)."""
+    across = np.stack(np.broadcast_arrays(-np.asarray(along_x), -np.asarray(along_y), 1.0), axis=-1)
+    normal: Array = across / np.linalg.norm(across, axis=-1, keepdims=True)
+    return normal

@@ -11,6 +11,9 @@ from rftsim.sand.strength import GRAVITY, xi_n_from_table
 ALPHA_Z_PLATE: Final = 0.87574
 """Generic stress of 3D-RFT (Table C.3) on a flat plate pushed straight down; joins zeta and xi_n."""
 
+STEEPEST: Final = math.radians(35.0)
+"""Angle of repose of a sand of unknown friction, about the steepest there is [rad]."""
+
 
 def number(default: float | None, *, above: float | None = None, at_least: float | None = None) -> Any:
     """A field of `Sand` for a parameter that is a number, with its default and its lower bound.
@@ -85,6 +88,11 @@ class Sand:
         if self.rho_c is None or self.mu_int is None:
             raise SandError("sand needs a strength: give xi_n, or zeta, or rho_c and mu_int")
         return xi_n_from_table(self.rho_c, self.mu_int, self.g)
+
+    @property
+    def repose(self) -> float:
+        """Angle of repose [rad], whose tangent is the internal friction; of unknown friction, the steepest there is."""
+        return STEEPEST if self.mu_int is None else math.atan(self.mu_int)
 
     def density(self) -> float:
         """The density rho_c [kg/m^3], which the dynamic laws need.

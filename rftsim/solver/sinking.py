@@ -2,10 +2,12 @@
 
 from typing import Final
 
-from rftsim.law import step_frame, sums
-from rftsim.law.body import bed_at, body_at, header_at
-from rftsim.law.frame import level_frame
+import numpy as np
+
+from rftsim.law import exports, step_frame
+from rftsim.law.body import frame_over, header_at
 from rftsim.law.free_surface import after, lowest_depth
+from rftsim.law.vectors import dot
 from rftsim.machine.compiling import exact, inline
 from rftsim.machine.memory import doubles, stack_doubles
 from rftsim.solver import equation
@@ -18,9 +20,9 @@ FALL: Final = 30.0
 @inline
 def is_near(sand, surface, xpos, xmat, speed, h):
     """Whether any triangle can be in the sand within a step: by a body's bounding box and the size of its twist."""
-    bed, header = bed_at(sand), header_at(surface)
-    frame = level_frame(bed, xpos, xmat, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-    return lowest_depth(header.lowest, header.highest, frame) + h * (speed + h * FALL) > 0.0
+    header, still, way = header_at(surface), (0.0, 0.0, 0.0), h * (speed + h * FALL)
+    frame = frame_over(sand, surface, xpos, xmat, still, still, way)
+    return lowest_depth(header.lowest, header.highest, frame) + np.sqrt(dot(frame.rise, frame.rise)) * way > 0.0
 
 
 @exact
@@ -37,8 +39,7 @@ def deepest(p, b, v, h):
     """Largest depth of a body's triangles, now or after a time h of the motion v [m]."""
     twist = doubles(stack_doubles(6), 6)
     twist_of(p, b, v, twist)
-    body, frame, found = body_at(equation.surface(p)[b]), frame_at(p, b, twist), -1e30
-    for _ in range(2):
-        found = max(found, sums.deepest(body, frame))
-        frame = after(frame, h)
-    return found
+    sand, frame, rotation = equation.head(p).sand, equation.frame(p, b), equation.rotation(p, b)
+    return exports.deepest(
+        sand, equation.surface(p)[b], frame.ctypes.data, rotation.ctypes.data, twist.ctypes.data, h
+    )  # fmt: skip

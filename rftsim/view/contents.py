@@ -11,8 +11,11 @@ from numpy.typing import NDArray
 
 from rftsim.errors import RftsimError
 from rftsim.surface.triangles import Array
+from rftsim.view.colours import traction_colours
 from rftsim.view.frames import Frame, Portrait
-from rftsim.view.shapes import geom_mesh, sand_shapes, snapped, traction_colours, triangle_mesh
+from rftsim.view.shapes import geom_mesh, sand_shapes, snapped, triangle_mesh
+from rftsim.view.tile_shapes import ground_scale, tile_rows
+from rftsim.view.tiles import Place, tile_triangles
 
 OWN_PATHS: Final = ("world", "sand", "speed", "about")
 """First elements of the paths that the recorder itself writes."""
@@ -39,6 +42,8 @@ def send(
     if together is not None:
         for channel in _changing(portrait, together, *scales):
             rows[channel[0]] += _send_channel(stream, together.time, channel)
+    for time, channel in _ground(portrait):
+        rows[channel[0]] += _send_channel(stream, time, channel)
     for entity, pairs in scalars.items():
         time, values = np.array(pairs).T
         rows[entity] += _send_channel(stream, time, (entity, rr.Scalars, {"scalars": values}))
@@ -77,7 +82,9 @@ def _changing(portrait: Portrait, frames: Frame, force_scale: float, traction_sc
         yield _entity("world", "body", portrait.name(body)), rr.Transform3D, pose
     for root, speed in zip(portrait.roots, frames.speed.T, strict=True):
         yield _entity("speed", portrait.name(root)), rr.Scalars, {"scalars": speed}
-    for bed, plane in portrait.beds:
+    for bed, plane, tiles in portrait.beds:
+        if tiles is not None:
+            continue
         middle = frames.position[:, list(bed.bodies)].mean(axis=1)
         yield _entity("world", "sand", bed.name), rr.Transform3D, {"translation": snapped(middle, plane, portrait.cell)}
     if portrait.skins:
@@ -96,18 +103,30 @@ def _changing(portrait: Portrait, frames: Frame, force_scale: float, traction_sc
         yield _entity("world", "body", name, "skin"), rr.Mesh3D, {"vertex_colors": colours}
 
 
+def _ground(portrait: Portrait) -> Iterator[tuple[Array, Channel]]:
+    """The tiles of ground, each with the times at which it changed."""
+    for bed, _, tiles in portrait.beds:
+        if tiles is not None:
+            for place, time, fields in tile_rows(tiles, ground_scale(tiles)):
+                yield time, (_tile(bed.name, place), rr.Mesh3D, fields)
+
+
 def _fixed(portrait: Portrait, force_scale: float, traction_scale: float) -> Iterator[tuple[str, rr.AsComponents]]:
     """The entities that stay as they are, each with its shape, text or style."""
     about = (
         f"**Arrows**, from the surface above where it acts: the sand's force, {portrait.extent:.3g} m long for "
         f"{force_scale:.3g} N. **Colours**: traction, darkest from {traction_scale:.3g} Pa on; grey where sand does "
-        f"not act. **Grid**: {portrait.cell:g} m."
+        f"not act. {_about_ground(portrait)}"
     )
     yield "/about", rr.TextDocument(about, media_type="text/markdown")
     yield "/world", rr.ViewCoordinates.RIGHT_HAND_Z_UP
-    for bed, plane in portrait.beds:
-        for shape in sand_shapes(plane, portrait.cell):
-            yield _entity("world", "sand", bed.name), shape
+    for bed, plane, tiles in portrait.beds:
+        if tiles is None:
+            for shape in sand_shapes(plane, portrait.cell):
+                yield _entity("world", "sand", bed.name), shape
+        else:
+            for place in tiles.kept:
+                yield _tile(bed.name, place), rr.Mesh3D.from_fields(triangle_indices=tile_triangles())
     for skin in portrait.skins:
         name = portrait.name(skin.body)
         yield _entity("world", "body", name, "skin"), triangle_mesh(skin.triangles)
@@ -149,6 +168,16 @@ def blueprint(portrait: Portrait, scalars: Iterable[str]) -> rrb.Blueprint:
     )
 
 
+def _about_ground(portrait: Portrait) -> str:
+    """What the drawn ground means."""
+    marks = max((ground_scale(bed.tiles) for bed in portrait.beds if bed.tiles is not None), default=None)
+    if marks is None:
+        return f"**Grid**: {portrait.cell:g} m."
+    if marks == 0.0:
+        return "**Ground**: undisturbed."
+    return f"**Ground**: darkest {1000.0 * marks:.2g} mm below the undisturbed, lightest as much above."
+
+
 def scalar_entity(path: str) -> str:
     """The entity of a caller's scalar, from its path.
 
@@ -161,6 +190,10 @@ def scalar_entity(path: str) -> str:
             f"a scalar's path is a group and a name, the group not of {', '.join(OWN_PATHS)}; not {path!r}"
         )
     return _entity(*parts)
+
+
+def _tile(bed: str, place: Place) -> str:
+    return _entity("world", "sand", bed, "{}_{}".format(*place))
 
 
 def _entity(*parts: str) -> str:

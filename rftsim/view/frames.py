@@ -8,13 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from rftsim.model.bounds import bounds
 from rftsim.model.geometry import MESHES, bounding_geoms
 from rftsim.model.readout import Instance, body_velocities, instances, tractions, wrenches
 from rftsim.model.shaping import Fineness, body_surface
 from rftsim.model.standing import moving_weight
 from rftsim.surface.triangles import Array
-from rftsim.view.bounds import bounds
 from rftsim.view.forces import resultants
+from rftsim.view.ground import surface_of
+from rftsim.view.tiles import Tiles
 
 
 class Plane(NamedTuple):
@@ -28,6 +30,17 @@ class Plane(NamedTuple):
     """Unit normal, out of the sand, shape (3,)."""
     offset: float
     """Distance of the surface from the world's origin, along `up` [m]."""
+
+
+class Bed(NamedTuple):
+    """A bed of sand as it is shown: a plane that follows the bodies, or tiles of ground that stay."""
+
+    instance: Instance
+    """The bed."""
+    plane: Plane
+    """Its free surface, where it is a plane."""
+    tiles: Tiles | None
+    """The ground that has been seen; None of a plane that keeps no marks."""
 
 
 class Skin(NamedTuple):
@@ -50,8 +63,8 @@ class Portrait(NamedTuple):
 
     model: mujoco.MjModel
     """The compiled model."""
-    beds: list[tuple[Instance, Plane]]
-    """Each bed of sand and its free surface."""
+    beds: list[Bed]
+    """Each bed of sand, and what has been seen of it."""
     skins: list[Skin]
     """The drawn triangles of each body that feels sand."""
     roots: list[int]
@@ -110,8 +123,22 @@ def describe(model: mujoco.MjModel) -> Portrait:
     beds = instances(model)
     skins = [_make_skin(model, start, body) for bed in beds for body in bed.bodies]
     roots = np.unique(model.body_rootid[[skin.body for skin in skins] or slice(1, None)]).tolist()
-    planes = [(bed, _make_plane(bed.bed)) for bed in beds]
-    return Portrait(model, planes, skins, roots, moving_weight(model), *bounds(model, start))
+    centre, extent = bounds(model, start)
+    shown = [Bed(bed, _make_plane(bed.bed), _make_tiles(model, start, bed, extent)) for bed in beds]
+    return Portrait(model, shown, skins, roots, moving_weight(model), centre, extent)
+
+
+def _make_tiles(model: mujoco.MjModel, data: mujoco.MjData, bed: Instance, extent: float) -> Tiles | None:
+    spacing = getattr(surface_of(model, data, bed), "spacing", None)
+    return None if spacing is None else Tiles(float(np.min(spacing)), extent)
+
+
+def note_ground(portrait: Portrait, data: mujoco.MjData, time: float) -> None:
+    """Keep the ground around the bodies, where it is new or has changed, to stand at a time of the recording [s]."""
+    for bed, _, tiles in portrait.beds:
+        if tiles is not None:
+            places = data.xpos[list(bed.bodies), :2]
+            tiles.note(places, surface_of(portrait.model, data, bed).height_at, time)
 
 
 def _make_skin(model: mujoco.MjModel, start: mujoco.MjData, body: int) -> Skin:

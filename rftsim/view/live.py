@@ -1,6 +1,7 @@
 """A model on sand, live in MuJoCo's viewer: real time, pushed with the mouse, sand that grows stronger or weaker."""
 
 import contextlib
+import math
 import threading
 import time
 import warnings
@@ -11,12 +12,14 @@ import mujoco
 import numpy as np
 
 from rftsim.errors import RftsimError
-from rftsim.model.readout import instances, sand_planes
+from rftsim.model.readout import instances
 from rftsim.model.standing import moving_weight
-from rftsim.run.robot import total_force
+from rftsim.run.robot import against_gravity, total_force
+from rftsim.view.cameras import framing
 from rftsim.view.drawing import Drawing, Shown
-from rftsim.view.look import dress
-from rftsim.view.render import framing
+from rftsim.view.ground import Ground
+from rftsim.view.look import dress, sand_geoms
+from rftsim.view.tractions import said
 
 FRAME: Final = 1.0 / 60.0
 """Time between two pictures [s]."""
@@ -24,7 +27,9 @@ LONGEST: Final = 0.05
 """Simulated time that a picture waits for, at most; a slower simulation falls behind real time [s]."""
 FACTOR: Final = 1.25
 """Factor by which a key makes the sand stronger or weaker."""
-OPACITIES: Final = (0.5, 1.0, 0.2)
+GROUND: Final = 0.1
+"""Time between two looks at the ground, which may have got marks or been left behind [s]."""
+OPACITIES: Final = (1.0, 0.5, 0.2)
 """Opacities of the sand, which a key goes through."""
 SPACE, BACKSPACE, DOWN, UP = 32, 259, 264, 265
 """Codes of the viewer's keys."""
@@ -34,7 +39,7 @@ KEYS: Final = (
     ("Up, Down", "sand stronger, weaker"),
     ("6", "forces"),
     ("7", "tractions"),
-    ("8", "opacity of the sand"),
+    ("8", "see through the sand"),
     ("T", "see through the model"),
     ("double click, Ctrl + drag", "choose a body, push it"),
 )
@@ -55,6 +60,10 @@ class Handle(Protocol):
         """A context in which the viewer leaves the model and its data alone."""
         ...
 
+    def update_hfield(self, hfieldid: int) -> None:
+        """Take over the heights of a height field, to be drawn."""
+        ...
+
     def sync(self) -> None:
         """Take over the data as they are, to be drawn."""
         ...
@@ -68,7 +77,7 @@ class Live:
     """A simulation that follows a clock, and what keys do to it.
 
     Args:
-        model: Compiled, with sand; its sand is what the keys change.
+        model: Compiled, with sand; its sand is what the keys change, and how that is drawn.
         begin: Makes the data of the start.
     """
 
@@ -81,6 +90,8 @@ class Live:
         self._drawing, self._opacity, self._owed = Drawing(model), 0, 0.0
         dress(model, self._drawing.extent)
         self._cover()
+        self._ground, self._looked = Ground(model), -math.inf
+        self.look(0.0)
         self._pressed: list[int] = []
 
     def press(self, key: int) -> None:
@@ -108,16 +119,29 @@ class Live:
         scene.ngeom = 0
         self._drawing.draw(scene, self.data, self.shown)
 
+    def look(self, now: float) -> list[int]:
+        """Take over the ground as it is, if some time has passed; ids of the height fields that changed.
+
+        Args:
+            now: Time by any clock [s].
+        """
+        if now - self._looked < GROUND:
+            return []
+        self._looked = now
+        return self._ground.follow(self.data)
+
     def texts(self) -> tuple[str, str]:
         """Two columns of text: the time, the sand, and the keys."""
-        weight, up = moving_weight(self.model), instances(self.model)[0].bed.up
-        lift = float(total_force(self.model, self.data) @ up)
+        weight = moving_weight(self.model)
+        lift = against_gravity(self.model, total_force(self.model, self.data))
         carried = f"{100.0 * lift / weight:.0f} % of {weight:.4g} N" if weight > 0.0 else f"{lift:.4g} N"
         state = [
             ("time", f"{self.data.time:.2f} s{', paused' if self.paused else ''}"),
             ("sand carries", carried),
             ("sand's strength", f"{self.strength:.2f}"),
         ]
+        if self.shown.tractions:
+            state.append(("traction, 0 to", said(self._drawing.largest)))
         names, values = zip(*state, *KEYS, strict=True)
         return "\n".join(names), "\n".join(values)
 
@@ -139,7 +163,7 @@ class Live:
 
     def _cover(self) -> None:
         """Give the drawn sand its opacity."""
-        self.model.geom_rgba[sand_planes(self.model), 3] = OPACITIES[self._opacity]
+        self.model.geom_rgba[list(sand_geoms(self.model)), 3] = OPACITIES[self._opacity]
 
     def _restart(self) -> None:
         """Go back to the start, in the same data, which the viewer holds."""
@@ -181,6 +205,9 @@ def follow(live: Live, handle: Handle, seconds: float | None = None) -> None:
         with handle.lock():
             live.advance(now - last, handle.perturb)
             live.draw(handle.user_scn)
+            changed = live.look(now)
+        for one in changed:
+            handle.update_hfield(one)
         last = now
         place = mujoco.mjtGridPos.mjGRID_TOPLEFT
         handle.set_texts((mujoco.mjtFontScale.mjFONTSCALE_100, place, *live.texts()))

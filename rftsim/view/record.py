@@ -5,30 +5,34 @@ import types
 import uuid
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Self
+from typing import Final, Self
 
 import mujoco
 import rerun as rr
 
 from rftsim.errors import RftsimError
 from rftsim.view.contents import blueprint, scalar_entity, send
-from rftsim.view.frames import Frame, describe, sample
+from rftsim.view.frames import Frame, describe, note_ground, sample
 from rftsim.view.recording_file import check_recordable, write_verified
+
+GROUND_PERIOD: Final = 0.1
+"""Simulated time between two looks at the ground [s]."""
 
 
 class Recorder:
     """Records one MuJoCo simulation for the Rerun viewer.
 
     Under `world`: the geoms (not planes and height fields, which have no end), the surfaces that feel the sand coloured
-    by traction, an arrow of the sand's force on each body from the surface above where it acts, and the sand's surface,
-    which follows the bodies in whole cells of its grid. Under `sand`: force [N], moment about the body's origin [N m]
-    and depth of the deepest triangle [m] of each body, and the total power [W]. Under `speed`: that of each root body
-    [m/s]. All are those of the last mj_forward or mj_step of the data. `about` states the scales, which are those of
-    the whole recording.
+    by traction, an arrow of the sand's force on each body from the surface above where it acts, and the sand's surface.
+    A plane follows the bodies in whole cells of its grid. Of terrain, and of sand that keeps marks, what is around the
+    bodies is kept in tiles that stay, and each is recorded again when it has changed. Under `sand`: force [N], moment
+    about the body's origin [N m] and depth of the deepest triangle [m] of each body, and the total power [W]. Under
+    `speed`: that of each root body [m/s]. All are those of the last mj_forward or mj_step of the data. `about` states
+    the scales, which are those of the whole recording.
 
-    Frames stay in memory, some 4 bytes per triangle each, until `close` writes the file. An exception inside the
-    with-block does so too: the frames before it show what went wrong. When a reset turns time back, the recording goes
-    on one period after its last frame.
+    Frames stay in memory, some 4 bytes per triangle each, and 2.5 kB for each tile that changed, ten times a second,
+    until `close` writes the file. An exception inside the with-block does so too: the frames before it show what went
+    wrong. When a reset turns time back, the recording goes on one period after its last frame.
 
     Args:
         model: A compiled model, with or without sand.
@@ -54,6 +58,7 @@ class Recorder:
         self._application_id, self._period, self._shift = application_id, 1.0 / fps, 0.0
         self._portrait = describe(model)
         self._frames: list[Frame] = []
+        self._looked = -math.inf
         self._scalars: dict[str, list[tuple[float, float]]] = {}
         self._closed = False
 
@@ -85,6 +90,9 @@ class Recorder:
             return False
         extra = {scalar_entity(path): float(value) for path, value in (scalars or {}).items()}
         self._frames.append(sample(self._portrait, data, time))
+        if time - self._looked >= GROUND_PERIOD * (1.0 - 1e-6):
+            note_ground(self._portrait, data, time)
+            self._looked = time
         for entity, value in extra.items():
             self._scalars.setdefault(entity, []).append((time, value))
         return True

@@ -1,43 +1,20 @@
 """Shapes and colours of a recording: the sand, the geoms, and the skins that feel the sand."""
 
-from typing import Any, Final
+from typing import Final
 
 import mujoco
 import numpy as np
 import rerun as rr
-from numpy.typing import NDArray
 
 from rftsim.errors import SceneError
 from rftsim.model.geometry import geom_triangles
 from rftsim.surface.triangles import Array
 from rftsim.view.frames import Plane
 
-INACTIVE: Final = (150, 150, 150)
-"""Colour of triangles that the sand does not act on: grey."""
-STOPS: Final = ((252, 197, 192), (250, 159, 181), (247, 104, 161), (197, 27, 138), (122, 1, 119))
-"""Colours of traction from none to the strongest, evenly spaced, ever darker: ColorBrewer's RdPu."""
 SAND: Final = (0.76, 0.70, 0.50, 0.2)
 """Colour and opacity of the drawn sand."""
 GRID_CELLS: Final = 16
 """Cells of the grid along each side of the drawn sand."""
-
-
-def traction_colours(traction: NDArray[np.floating[Any]], scale: float) -> NDArray[np.uint32]:
-    """Colours 0xRRGGBBAA of tractions [Pa], the darkest from scale on; grey where they are negative, or not numbers."""
-    strength = np.minimum(np.where(traction >= 0.0, traction, 0.0) / scale, 1.0)
-    return _PALETTE[np.where(traction >= 0.0, 1.0 + 254.0 * strength, 0.0).astype(np.intp)]
-
-
-def _palette() -> NDArray[np.uint32]:
-    """Make the table of colours 0xRRGGBBAA: the inactive one, then 255 shades."""
-    places, at = np.linspace(0.0, 1.0, len(STOPS)), np.linspace(0.0, 1.0, 255)
-    shades = np.stack([np.interp(at, places, channel) for channel in np.array(STOPS).T], axis=1)
-    rgb = np.vstack([INACTIVE, shades.round()]).astype(np.uint32)
-    palette: NDArray[np.uint32] = (rgb[:, 0] << 24) + (rgb[:, 1] << 16) + (rgb[:, 2] << 8) + np.uint32(255)
-    return palette
-
-
-_PALETTE: Final = _palette()
 
 
 def snapped(place: Array, plane: Plane, cell: float) -> Array:

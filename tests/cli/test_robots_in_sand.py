@@ -71,9 +71,24 @@ def test_run_measures_the_robot(capsys, robot):
 def test_a_picture_of_any_model(capsys, robot, tmp_path):
     """The model's own offscreen buffer, of 640 x 480, is too small for it."""
     picture = tmp_path / "robot.png"
-    report(capsys, "run", robot, "--duration", 0.05, "--picture", picture)
+    report(capsys, "run", robot, "--duration", 0.05, "--picture", picture, "--tractions", "--buried")
     assert picture.read_bytes().startswith(b"\x89PNG")
     assert int.from_bytes(picture.read_bytes()[16:20], "big") == 960
+
+
+def test_a_film_of_any_model(capsys, robot, tmp_path):
+    """Thirty pictures a second, of the size of pictures; refused where it could not be written, before the run."""
+    av = pytest.importorskip("av")
+    film = tmp_path / "robot.mp4"
+    report(capsys, "run", robot, "--duration", 0.2, "--video", film)
+    with av.open(str(film)) as container:
+        frames = [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
+    assert len(frames) == 6
+    assert frames[0].shape == (540, 960, 3)
+    assert frames[0].std() > 10.0
+    code, _, err = call(capsys, "run", robot, "--video", tmp_path / "robot.gif")
+    assert code == 2
+    assert "must end in .mp4" in err
 
 
 def test_run_without_settling_falls(capsys, robot):
@@ -87,7 +102,7 @@ def test_run_without_settling_falls(capsys, robot):
 def test_the_options_of_a_model_file(capsys, robot):
     """The bodies that feel the sand, its height and the keyframe, of `inspect` and `run` alike."""
     coarse = ("inspect", robot, "--reduction", 0.9)
-    told = report(capsys, *coarse, "--bodies", "left,right", "--surface", 0.3, "--keyframe", "wide")
+    told = report(capsys, *coarse, "--bodies", "left,right", "--terrain", 0.3, "--keyframe", "wide")
     assert not told["bodies"]["trunk"]["feels_sand"]
     assert told["surface"]["height"] == 0.3
     (stand,) = told["stands"]

@@ -57,11 +57,13 @@ def test_the_sand_lies_where_the_floor_was(floor, top, height):
 
 
 def test_height_fields_are_floors():
-    """A height field gives way to level sand at its height under the model, and the relief is said."""
+    """A height field gives way to sand with its relief, and the heights are said."""
     asset = '<asset><hfield name="h" nrow="5" ncol="5" size="3 3 .2 .1" elevation="' + "0 0 1 0 0 " * 5 + '"/></asset>'
     bed, data, carried = settled('<geom name="floor" type="hfield" hfield="h" pos="0 0 .5"/>' + FOOT, asset)
-    assert bed.terrain.height == pytest.approx(0.7)  # the ridge
-    assert "0.2 m of relief" in bed.choices[0]
+    assert bed.terrain.height_at([-3.0, 0.0, 1.5], 1.0) == pytest.approx([0.5, 0.7, 0.5])  # the ridge
+    assert (
+        "z = 0.5 to 0.7 m, in the place and with the relief of geom floor, which no longer collides" in bed.choices[0]
+    )
     assert carried == pytest.approx(1.0, abs=0.01)
     assert data.ncon == 0
 

@@ -9,7 +9,7 @@ from trees import spec_of, xml
 
 import rftsim
 from rftsim.law import layout
-from rftsim.model.standing import sinkage, stand, standing
+from rftsim.model.standing import PackedBed, sinkage, stand, standing
 
 XI_N = 2e5
 SAND = rftsim.Sand(xi_n=XI_N, rho_c=1500.0, mu_surf=0.4)
@@ -114,14 +114,22 @@ def test_the_pose_counts():
     assert side / flat == pytest.approx(0.1 / 0.04, rel=3e-3)
 
 
-def test_on_a_slope_it_moves_along_the_normal():
+@pytest.mark.parametrize("x", [0.0, 0.7])
+def test_on_a_slope_it_stays_over_its_place(x):
+    """Its weight along the normal is carried by a push along the normal; where on the plane it is changes nothing."""
     terrain = rftsim.FreeSurface(0.1, (-0.2, 0.0, 1.0))
     up = np.array(terrain.normal)
-    model = compiled(box("box", "0 0 1"), terrain=terrain)
+    model = compiled(box("box", f"{x} 0 1"), terrain=terrain, force="explicit")
     found = stood(model)
-    moved = found.qpos[:3] - [0, 0, 1]
-    assert moved == pytest.approx(-found.trees[0].lowered * up)
+    assert found.qpos[:3] - [x, 0, 1] == pytest.approx([0.0, 0.0, -found.trees[0].lowered])
+    assert found.qpos[2] - terrain.height_at(x, 0.0) == pytest.approx(stood(model, (0, 0, 0, 1, 0, 0, 0)).qpos[2] - 0.1)
+    assert found.trees[0].up == pytest.approx(up)
     assert found.trees[0].weight == pytest.approx(12 * G * up[2])
+    data = mujoco.MjData(model)
+    data.qpos[:] = found.qpos
+    data.qvel[:3] = -1e-6 * up
+    mujoco.mj_forward(model, data)
+    assert rftsim.wrenches(model, data).force[1] @ up == pytest.approx(12 * G * up[2], rel=1e-6)
     assert sum(foot.share for foot in found.trees[0].feet) == pytest.approx(1.0, abs=1e-9)
 
 
@@ -129,7 +137,7 @@ def test_before_the_sand_is_in_the_model():
     """`stand` takes packed sand and surfaces of a model without sand, and finds the same."""
     plain, model = mujoco.MjModel.from_xml_string(xml(box())), compiled(box())
     (bed,) = rftsim.instances(model)
-    found = stand(plain, mujoco.MjData(plain), bed.packed, bed.bodies)
+    found = stand(plain, mujoco.MjData(plain), PackedBed(bed.packed, bed.bodies, rftsim.FreeSurface()))
     assert found.qpos == pytest.approx(stood(model).qpos, abs=1e-12)
 
 
@@ -154,4 +162,4 @@ def test_sinkage_is_the_lowest_corners_depth(quat):
     lowest = max(-(corners @ turn).min(), 0.03 - turn @ [0.2, 0, -0.1])
     (bed,) = rftsim.instances(model)
     assert layout.extent(bed.bodies[1]) == pytest.approx(0.33, rel=0.01)
-    assert sinkage(bed.packed, bed.bodies[1], data.xpos[1], data.xmat[1]) == pytest.approx(lowest, abs=0.01)
+    assert sinkage(rftsim.FreeSurface(), bed.bodies[1], data.xpos[1], data.xmat[1]) == pytest.approx(lowest, abs=0.01)

@@ -10,14 +10,14 @@ import numpy as np
 from matplotlib import image
 from numpy.typing import NDArray
 
-from rftsim.view.render import SIZE, Pictures
+from rftsim.view import film
+from rftsim.view.cameras import SIZE
+from rftsim.view.drawing import ALL
+from rftsim.view.render import Pictures
 from rftsim_envs.env import SandEnv
-from rftsim_envs.recipe import TrainingError
 from rftsim_envs.tally import Tally
 from rftsim_envs.training.actors import Maker
 
-FPS: Final = 30.0
-"""Pictures per second of a film."""
 MOMENTS: Final = 4
 """Number of pictures in a strip."""
 
@@ -59,7 +59,7 @@ def play(
 def taking_strip(env: SandEnv, path: Path) -> Iterator[Callable[[Mapping[str, Any]], None]]:
     """Take a picture of `MOMENTS` moments, evenly spaced, on sand: call what is given after each control step.
 
-    Arrows are the sand's forces and tractions.
+    Arrows are the sand's forces and tractions, and what is buried shows.
     """
     states: list[NDArray[np.float64]] = []
     kept, model, camera = mujoco.mjtState.mjSTATE_INTEGRATION, env.model, "follow"
@@ -71,7 +71,7 @@ def taking_strip(env: SandEnv, path: Path) -> Iterator[Callable[[Mapping[str, An
 
     yield watch
     data, pictures = mujoco.MjData(model), []
-    with Pictures(model, SIZE[0] // 2, SIZE[1]) as taker:
+    with Pictures(model, SIZE[0] // 2, SIZE[1], ALL) as taker:
         for k in np.linspace(0, len(states) - 1, MOMENTS).round().astype(int):
             mujoco.mj_setState(model, data, states[k], kept)
             mujoco.mj_forward(model, data)
@@ -84,29 +84,14 @@ def filming(env: SandEnv, path: Path) -> Iterator[Callable[[Mapping[str, Any]], 
     """Film an environment, which must render: call what is given after each control step.
 
     Raises:
-        TrainingError: It cannot be written.
+        RftsimError: It cannot be written.
     """
-    import av  # an extra
+    clock = 0.0
+    with film.filming(path, *SIZE) as show:
 
-    taken = 0
-    try:
-        with av.open(str(path), "w") as container:
-            stream = container.add_stream("libx264", rate=round(FPS))
-            stream.width, stream.height, stream.pix_fmt = *SIZE, "yuv420p"
-            clock = 0.0
+        def watch(info: Mapping[str, Any]) -> None:
+            nonlocal clock
+            clock += env.config.period
+            show(env.render, clock)
 
-            def watch(info: Mapping[str, Any]) -> None:
-                nonlocal taken, clock
-                clock += env.config.period
-                while taken < clock * FPS - 1e-6:
-                    picture = env.render()
-                    assert picture is not None
-                    for packet in stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")):
-                        container.mux(packet)
-                    taken += 1
-
-            yield watch
-            for packet in stream.encode():
-                container.mux(packet)
-    except OSError as error:
-        raise TrainingError(f"cannot write {path}: {error}") from error
+        yield watch

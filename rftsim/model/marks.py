@@ -1,0 +1,34 @@
+"""The ruts that fit a model: cells small against what presses on the sand, in a window around all that does."""
+
+from collections.abc import Mapping
+from typing import Final
+
+import mujoco
+import numpy as np
+
+from rftsim.sand.ruts import Ruts, ruts_for
+from rftsim.surface.triangles import Surface
+
+PRESSING: Final = 0.25
+"""Bodies press whose lowest point lies no higher above the lowest of all than this part of the largest body's size."""
+
+
+def marks_for(data: mujoco.MjData, model: mujoco.MjModel, surfaces: Mapping[str, Surface]) -> Ruts:
+    """The ruts of a model's bodies, by the narrowest of those that stand lowest.
+
+    Args:
+        data: Its data in the pose in which it starts, with kinematics.
+        model: Compiled.
+        surfaces: Whole surface of each body that feels the sand, by body name.
+    """
+    corners = {}
+    for name, surface in surfaces.items():
+        body = model.body(name).id
+        corners[name] = surface.corners @ data.xmat[body].reshape(3, 3).T + data.xpos[body]
+    lowest = {name: float(points[:, 2].min()) for name, points in corners.items()}
+    reach = PRESSING * max(surface.size for surface in surfaces.values())
+    pressing = [name for name, height in lowest.items() if height <= min(lowest.values()) + reach]
+    width = min(float(np.sort(np.ptp(surfaces[name].corners, axis=0))[1]) for name in pressing)
+    everything = np.concatenate(list(corners.values()))
+    x, y = np.ptp(everything[:, :2], axis=0).tolist()
+    return ruts_for(width, (x, y))
