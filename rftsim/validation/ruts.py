@@ -5,59 +5,28 @@ the same motions in MuJoCo. Plane strain has no sides, so bodies here are as wid
 wheel is played as wide as it is, too.
 """
 
-import dataclasses
 import functools
-import inspect
 import math
-from collections.abc import Callable, Iterable
-from typing import Any, Final, NamedTuple
+from collections.abc import Callable
+from typing import Any, Final
 
-import mujoco
 import numpy as np
-from rftsim_models.studio import new_scene
-from rftsim_models.wheels import GROUSER_WHEEL, WHEEL, build_wheel
-from rftsim_mpm.blade import SHARES, Blade
-from rftsim_mpm.footprint import Footprint
-from rftsim_mpm.rut import ENTRY, Rut
+from rftsim_mpm.blade import SHARES
+from rftsim_mpm.rut import Rut
 
-from rftsim.model.add_sand import add_sand
-from rftsim.model.readout import wrenches
-from rftsim.run.scenes import POPPY
-from rftsim.sand.medium import Sand
 from rftsim.surface.triangles import Array
+from rftsim.validation.played import VARIANTS, WIDTH, blade, foot, wheel
 from rftsim.validation.shipped import Results, outcome, shipped
 from rftsim.validation.study import Measured, Request, Row, near
 
-LAW: Final = "rft2d"
-"""The law that is played: of plane strain, and without the drop of the surface that ruts would count twice."""
-VARIANTS: Final[dict[str, dict[str, Any]]] = {"no ruts": {}} | (
-    {"ruts": {"ruts": True}} if "ruts" in inspect.signature(add_sand).parameters else {}
-)
-"""Options of `add_sand` by what the sand remembers."""
-ZETA: Final = 1e6
-"""Strength of the sand of foot and blade [N/m^3]: forces are proportional to it, and compared as ratios."""
-WIDTH: Final = 1.0
-"""Width of the bodies [m]."""
-MASS: Final = 1e9
-"""Mass of foot and blade, which the sand's force cannot slow down [kg]."""
-TIMESTEP: Final = 1e-3
-"""Time step of foot and blade [s]."""
 BOUNDS: Final = {"ratio": 0.2, "slip": 0.05, "mm": 3.0}
 """How far laws with ruts may be off: in ratios of forces, and in what a second pass adds to slip and sinkage [mm]."""
 
 
-class Played(NamedTuple):
-    """A stage of a motion: where the body was, and what the sand did to it."""
-
-    travel: Array
-    """Displacement along x and z from where the model places the body, (n, 2) [m]."""
-    force: Array
-    """Force of the sand along x and z, (n, 2) [N/m]."""
-
-
 def jobs(request: Request) -> dict[str, Callable[[], Any]]:
     """The job that reads the continuum, and a job for each motion and each memory of the sand."""
-    plays = {"foot": foot, "blade": blade, "wheel": wheel, "narrow": functools.partial(wheel, width=Rut().breadth)}
+    narrow = functools.partial(wheel, width=Rut().breadth)
+    plays: dict[str, Callable[[str], Any]] = {"foot": foot, "blade": blade, "wheel": wheel, "narrow": narrow}
     played = {
         f"{name}/{variant}": functools.partial(play, variant) for name, play in plays.items() for variant in VARIANTS
     }
@@ -74,113 +43,6 @@ def _continuum(results: Results) -> dict[str, list[dict[str, Any]]]:
     return found
 
 
-def _box(size: tuple[float, float], place: tuple[float, float], sand: Sand, variant: str) -> mujoco.MjModel:
-    """A box of a size along x and z [m], its middle at a place, on two slides over level sand."""
-    spec = new_scene("box", gravity=9.81, timestep=TIMESTEP)
-    body = spec.worldbody.add_body(name="box", pos=[place[0], 0.0, place[1]], gravcomp=1.0)
-    body.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=[0.5 * size[0], 0.5 * WIDTH, 0.5 * size[1]], mass=MASS)
-    for axis in ([1, 0, 0], [0, 0, 1]):
-        body.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
-    add_sand(spec, sand, LAW, terrain=0.0, draw=False, **VARIANTS[variant])
-    return spec.compile()
-
-
-def _play(model: mujoco.MjModel, stages: Iterable[tuple[float, float, float]]) -> list[Played]:
-    """Move a body on two slides at velocities along x and z [m/s], each for a duration [s]."""
-    data = mujoco.MjData(model)
-    index = model.body("box").id
-    played = []
-    for vx, vz, duration in stages:
-        rows = []
-        for _ in range(round(duration / model.opt.timestep)):
-            data.qvel[:] = vx, vz
-            mujoco.mj_step(model, data)
-            rows.append([*data.qpos, *wrenches(model, data).force[index, [0, 2]] / WIDTH])
-        table = np.array(rows)
-        played.append(Played(table[:, :2], table[:, 2:]))
-    return played
-
-
-def foot(variant: str) -> dict[str, Any]:
-    """Press the foot of the continuum's study twice: depth [m] and upward force per width and ZETA of both pushes."""
-    study = Footprint()
-    sand = Sand(rho_c=study.rho, mu_int=study.mu_int, mu_surf=study.mu_surf, zeta=ZETA)
-    model = _box((study.length, study.height), (0.0, 0.5 * study.height), sand, variant)
-    speed, away = study.speed, study.depth + study.clear
-    stages = [
-        (0.0, -speed, study.depth / speed),
-        (0.0, speed, away / speed),
-        (0.0, 0.0, study.rest),
-        (0.0, -speed, (study.clear + study.again) / speed),
-    ]
-    first, _, _, second = _play(model, stages)
-    return {
-        name: {"depth_m": (-push.travel[:, 1]).tolist(), "force": (push.force[:, 1] / ZETA).tolist()}
-        for name, push in (("first", first), ("second", second))
-    }
-
-
-def blade(variant: str) -> dict[str, Any]:
-    """Drag the blade of the continuum's study: travel [m] and drag per width and ZETA."""
-    study = Blade()
-    sand = Sand(rho_c=study.rho, mu_int=study.mu_int, mu_surf=study.mu_surf, zeta=ZETA)
-    height = study.depth + 1.5 * study.heap
-    model = _box((study.thickness, height), (0.0, 0.5 * height - study.depth), sand, variant)
-    (dragged,) = _play(model, [(study.speed, 0.0, study.travel / study.speed)])
-    return {"travel_m": dragged.travel[:, 0].tolist(), "drag": (-dragged.force[:, 0] / ZETA).tolist()}
-
-
-def wheel(variant: str, width: float = WIDTH) -> dict[str, Any]:
-    """Drive the wheel of the continuum's study twice over the same sand: slip and sinkage of both passes."""
-    study = Rut()
-    share = width / study.breadth
-    parameters = dataclasses.replace(
-        GROUSER_WHEEL,
-        width=width,
-        vertical_mass=share * study.mass_z,
-        horizontal_mass=share * study.mass_x,
-        forward_force=share * study.push,
-        gravity=study.gravity,
-    )
-    spec = build_wheel(parameters, study.rpm)
-    options = {"meshes": "exact", "max_edge": 2 * width, "draw": False, **VARIANTS[variant]}
-    add_sand(spec, POPPY, LAW, bodies=[WHEEL], terrain=0.0, **options)
-    model = spec.compile()
-    data = mujoco.MjData(model)
-    passes = []
-    for _ in range(2):
-        _put_back(model, data, study.rest)
-        passes.append(_drive(model, data, study.time))
-    first, second = (float(x[-1]) for x, _, _ in passes)
-    low, high = ENTRY * first, min(first - study.outer, second)
-    rim = 2.0 * np.pi * study.rpm / 60.0 * study.outer
-    slip, sunk = [], []
-    for x, v, z in passes:
-        own = (x >= low) & (x <= high)
-        slip.append(1.0 - 1.0 / float(np.mean(1.0 / v[own])) / rim)
-        sunk.append(float(z[own].mean()))
-    return {"slip": slip, "sinkage_m": sunk}
-
-
-def _put_back(model: mujoco.MjModel, data: mujoco.MjData, rest: float) -> None:
-    """Hold the wheel above the sand for a while [s], and put it where the keyframe has it, sand as it is."""
-    for _ in range(round(rest / model.opt.timestep)):
-        data.qpos[:], data.qvel[:], data.ctrl[:] = (0.0, 1.0, 0.0), 0.0, 0.0
-        mujoco.mj_step(model, data)
-    key = model.key("start")
-    data.qpos[:], data.qvel[:], data.ctrl[:] = key.qpos, key.qvel, key.ctrl
-
-
-def _drive(model: mujoco.MjModel, data: mujoco.MjData, duration: float) -> tuple[Array, Array, Array]:
-    """Distance [m], speed [m/s] and sinkage of the outer circle below level ground [m] over a duration [s]."""
-    rows = []
-    for _ in range(round(duration / model.opt.timestep)):
-        mujoco.mj_step(model, data)
-        rows.append((data.qpos[0], data.qvel[0], -data.qpos[1]))
-    x, v, z = np.array(rows).T
-    return x, v, z
-
-
 def rows(measured: Measured) -> list[Row]:
     """The rows of foot, blade and wheel, without ruts and, where the sand can remember, with them."""
     found = outcome(measured, "ruts")
@@ -190,7 +52,7 @@ def rows(measured: Measured) -> list[Row]:
     for variant in VARIANTS:
         table += _foot_rows(found["footprint"], measured[f"foot/{variant}"], variant)
         table += _blade_rows(found["blade"], measured[f"blade/{variant}"], variant)
-        for name, said in (("wheel", f"wheel {WIDTH:g} m wide"), ("narrow", "wheel as it is")):
+        for name, said in (("wheel", f"wide wheel, {WIDTH:g} m"), ("narrow", "wheel as it is")):
             table += _wheel_rows(found["rut"], measured[f"{name}/{variant}"], variant, said)
     return [*table, *_own_rows(found)]
 
@@ -213,7 +75,11 @@ def _foot_rows(runs: list[dict[str, Any]], played: dict[str, Any], variant: str)
         return []
     fine = runs[-1]
     depths = np.array(fine["depths_m"])
-    return [
+    shape = [
+        _row(f"footprint: {what}", 1e3 * played[name], 1e3 * fine[name], BOUNDS["mm"], variant, "mm")
+        for what, name in (("print after its walls slid", "print_m"), ("its rim", "rim_m"))
+    ]
+    return shape + [
         _row(f"footprint, {1e3 * z:.0f} mm deep: second push over first", float(got), one, BOUNDS["ratio"], variant)
         for z, got, one in zip(depths, ratios(played, depths), fine["ratios"], strict=True)
     ]
@@ -230,7 +96,9 @@ def _blade_rows(runs: list[dict[str, Any]], played: dict[str, Any], variant: str
         expected = force / fine["start_N_m"]
         what = f"blade after {1e3 * way:.0f} mm: drag over that without a heap"
         table.append(_row(what, float(drag[own].mean()) / start, expected, BOUNDS["ratio"] * expected, variant))
-    return table
+    heap = 1e3 * fine["heap_m"][-1]
+    what = "blade at the end of its way: heap"
+    return [*table, _row(what, 1e3 * played["heap_m"], heap, BOUNDS["ratio"] * heap, variant, "mm")]
 
 
 def _wheel_rows(runs: list[dict[str, Any]], played: dict[str, Any], variant: str, said: str) -> list[Row]:
@@ -239,10 +107,12 @@ def _wheel_rows(runs: list[dict[str, Any]], played: dict[str, Any], variant: str
     fine = runs[-1]
     slip, sunk = np.array(fine["slip"]), 1e3 * np.array(fine["sinkage_m"])
     got_slip, got_sunk = np.array(played["slip"]), 1e3 * np.array(played["sinkage_m"])
-    more = f"{said}, second pass:"
+    flat = BOUNDS["mm"] if said.startswith("wide") else math.inf  # a wheel with sides lets sand out there
+    got_rut, more = 1e3 * played["rut_m"], f"{said}, second pass:"
     return [
         _row(f"{said}, first pass: slip", got_slip[0], slip[0], math.inf, variant),
         _row(f"{said}, first pass: sinkage", got_sunk[0], sunk[0], math.inf, variant, "mm"),
+        _row(f"{said}, first pass: its rut", got_rut, 1e3 * fine["rut_m"][0], flat, variant, "mm"),
         _row(f"{more} it slips more by", got_slip[1] - got_slip[0], slip[1] - slip[0], BOUNDS["slip"], variant),
         _row(f"{more} it sinks more by", got_sunk[1] - got_sunk[0], sunk[1] - sunk[0], BOUNDS["mm"], variant, "mm"),
     ]

@@ -35,7 +35,7 @@ STUDIES: Final = {
 }
 """Every study by name."""
 
-SHARED: Final = ("balance", "cmu", "plates", "pockets", "shipped", "terramechanics")
+SHARED: Final = ("balance", "cmu", "plates", "played", "pockets", "shipped", "terramechanics")
 """Modules of this folder that the studies' modules compute with."""
 PRESENTATION: Final = ("cli", "bench", "validation", "view")
 """Folders that no study computes with, except for its own modules."""
