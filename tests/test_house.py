@@ -76,8 +76,9 @@ def test_packed_arrays_are_read_by_name():
     [
         (r"^def share\(", "rftsim/law/leading.py"),
         (r"^def may_lead\(", "rftsim/law/leading.py"),
-        (r"^def depth\(", "rftsim/law/free_surface.py"),
-        (r"^def up\(", "rftsim/law/free_surface.py"),
+        (r"^def plane_depth\(", "rftsim/law/free_surface.py"),
+        (r"^def look\(", "rftsim/law/relief.py"),
+        (r"^def reaches\(", "rftsim/law/ruts.py"),
         (r"^def dropped\(", "rftsim/law/wheel_drop.py"),
     ],
 )

@@ -1,4 +1,4 @@
-"""A grid of plates, pushes, wheels or slopes as independent jobs: one result file each, written whole or not at all.
+"""A grid of plates, pushes, wheels, slopes or ruts as independent jobs: one result file each, whole or not at all.
 
 A campaign is a folder: `manifest.json` says what belongs to it, `results/KEY.json` holds one job's result with its
 own checksum, KEY being made from the job. What is there and whole is never computed again, so a campaign that was
@@ -21,22 +21,44 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from rftsim_mpm import plate, push, slope, wheel
+from rftsim_mpm import blade, footprint, plate, push, rut, slope, wheel
+from rftsim_mpm.blade import Blade
 from rftsim_mpm.errors import MpmError
+from rftsim_mpm.footprint import Footprint
 from rftsim_mpm.output import replacing
 from rftsim_mpm.plate import Plate
 from rftsim_mpm.push import Push
+from rftsim_mpm.rut import Rut
+from rftsim_mpm.simulation import Watch
 from rftsim_mpm.slope import Slope
 from rftsim_mpm.wheel import Wheel
 
-Job = Plate | Push | Wheel | Slope
-KINDS: dict[str, type[Job]] = {"plates": Plate, "pushes": Push, "wheels": Wheel, "slopes": Slope}
+Job = Plate | Push | Wheel | Slope | Footprint | Blade | Rut
+KINDS: dict[str, type[Job]] = {
+    "plates": Plate,
+    "pushes": Push,
+    "wheels": Wheel,
+    "slopes": Slope,
+    "footprints": Footprint,
+    "blades": Blade,
+    "ruts": Rut,
+}
 """The kinds of jobs by their names in files."""
+MEASURES: dict[type[Job], Callable[[Any, Watch | None], Any]] = {
+    Plate: plate.measure,
+    Push: push.measure,
+    Wheel: wheel.roll,
+    Slope: slope.measure,
+    Footprint: footprint.press,
+    Blade: blade.plow,
+    Rut: rut.follow_rut,
+}
+"""What measures each kind of job; its outcome has a `report` and a `series`."""
 
 MOST_JOBS = 100_000
 """Most jobs of one file."""
 DATA = Path(__file__).parent / "data"
-"""Campaigns that are shipped: `plates`, `flat`, `solids`, `deep`, `rates`, `wheels` and `slopes`."""
+"""Campaigns that are shipped: `plates`, `flat`, `solids`, `deep`, `rates`, `wheels`, `slopes` and `ruts`."""
 
 
 class Status(NamedTuple):
@@ -51,7 +73,7 @@ class Status(NamedTuple):
 
 
 def read_jobs(path: Path) -> list[Job]:
-    """Return the jobs of a TOML file: each list in a table that is named as in KINDS, is an axis of a grid.
+    """Return the jobs of a TOML file: each list in a table of one of KINDS, as `[[plates]]`, is an axis of a grid.
 
     Settings under `[defaults]` hold for all.
 
@@ -178,7 +200,7 @@ def _name(job: Job) -> str:
 
 
 def results(folder: Path) -> list[dict[str, Any]]:
-    """Return every finished result: `plate`, `push`, `wheel` or `slope`, and what was measured of it."""
+    """Return every finished result: its job, by its kind, and what the command of that name reports of it."""
     names = set(status(folder).finished)
     return [json.loads((folder / "results" / f"{name}.json").read_text()) for name in sorted(names)]
 
@@ -190,16 +212,7 @@ def _checksum(value: Any) -> str:
 def compute(job: Job, beat: Callable[[], None] | None = None) -> dict[str, Any]:
     """Compute the result of one job; `beat` is called at every step."""
     watch = None if beat is None else lambda sim, share: beat()
-    found: plate.PlateForce | push.PushForce | wheel.Rolling
-    match job:
-        case Slope():
-            found = slope.measure(job, watch)
-        case Plate():
-            found = plate.measure(job, watch)
-        case Push():
-            found = push.measure(job, watch)
-        case Wheel():
-            found = wheel.roll(job, watch)
+    found = MEASURES[type(job)](job, watch)
     result = {_name(job): dataclasses.asdict(job), **found.report, **found.series}
     return {**result, "sha256": _checksum(result)}
 

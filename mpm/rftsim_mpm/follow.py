@@ -19,6 +19,15 @@ def part(watch: Watch | None, index: int, count: int) -> Watch | None:
     return None if watch is None else lambda sim, share: watch(sim, (index + share) / count)
 
 
+def stage(sim: Simulation, duration: float, whole: float, watch: Watch | None = None) -> "Track":
+    """Run a simulation further by a duration, and return what its bodies did in it; `whole` is the time at its end [s].
+
+    `watch` is told the share of the whole that is done.
+    """
+    end = sim.time + duration
+    return follow(sim, end, None if watch is None else lambda sim, done: watch(sim, min(1.0, done * end / whole)))
+
+
 class Track(NamedTuple):
     """Averages over AVERAGE of the bodies' places, velocities and forces, and frames of the sand."""
 
@@ -55,7 +64,7 @@ def follow(sim: Simulation, duration: float, watch: Watch | None = None, shots: 
     frames: list[Frame] = []
     rows: list[Array] = []
     pending: list[Array] = []
-    until = AVERAGE
+    until = sim.time + AVERAGE
     while sim.time < duration:
         sim.step()
         moved = [part for body in sim.bodies for part in (body.position, body.velocity)]

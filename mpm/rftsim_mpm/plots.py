@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 
 from rftsim_mpm.fields import Frame
 from rftsim_mpm.reading import History
+from rftsim_mpm.relief import Relief
 
 PANELS = {
     "strain": ("equivalent plastic strain [-]", "magma", 99.0),
@@ -190,4 +191,23 @@ def plot_lines(
         axis = figure.add_subplot(grid[1 + i // 2, i % 2])
         draw_field(axis, frame, field)
         axis.set_title(title, fontsize=9)
+    figure.savefig(path)
+
+
+def plot_surfaces(
+    lines: list[tuple[str, Any, Any]], labels: tuple[str, str], surfaces: list[tuple[str, Relief]], path: Path
+) -> None:
+    """Draw some curves, and below them heights of the surface over x [mm], each with its name."""
+    figure = Figure(figsize=(9, 8), dpi=110, layout="constrained")
+    above, below = figure.subplots(2, 1)
+    for name, x, y in lines:
+        above.plot(x, y, label=name, linewidth=1.0)
+    for name, relief in surfaces:
+        below.plot(1e3 * relief.x, 1e3 * relief.height, label=name, linewidth=1.0)
+    for axis, (across, up) in zip((above, below), (labels, ("x [mm]", "height of the surface [mm]")), strict=True):
+        axis.set_xlabel(across)
+        axis.set_ylabel(up)
+        axis.grid(alpha=0.3)
+        axis.legend(fontsize=8)
+    below.set_aspect("equal", adjustable="datalim")
     figure.savefig(path)

@@ -128,22 +128,22 @@ class Rolling(NamedTuple):
 
 def roll(study: Wheel, watch: Watch | None = None) -> Rolling:
     """Lower the wheel onto a bed, spin it and let it go, and return how it rolled."""
-    sim = _prepared(study)
+    sim = prepare(study)
     track = follow(sim, study.time, watch)
-    level = _bed_depth(study)
+    level = bed_depth(study)
     speeds, sinkages = track.velocity[:, 0, 0], level + study.outer - track.position[:, 0, 1]
     late = track.time >= 0.6 * study.time
     speed, sinkage = float(speeds[late].mean()), float(sinkages[late].mean())
     slope = float(np.polyfit(track.time[late], speeds[late], 1)[0])
-    slip, drift = 1.0 - speed / (_omega(study) * study.outer), 0.4 * study.time * slope / speed
+    slip, drift = 1.0 - speed / (omega_of(study) * study.outer), 0.4 * study.time * slope / speed
     drop = _drop(study, track.frames[-1].surface, float(sim.bodies[0].position[0]))
     return Rolling(speed, sinkage, slip, drop, drift, track.time, speeds, sinkages, track)
 
 
-def _prepared(study: Wheel) -> Simulation:
+def prepare(study: Wheel) -> Simulation:
     """The bed, a half of a grouser's height into which the wheel has sunk, at its speed of entry."""
-    omega, outer, dx = _omega(study), study.outer, study.dx
-    depth = _bed_depth(study)
+    omega, outer, dx = omega_of(study), study.outer, study.dx
+    depth = bed_depth(study)
     before = 2.5 * outer
     length = math.ceil((2.0 * before + abs(omega) * outer * study.time) / dx) * dx
     young = stiffness(study.rho, study.gravity, 0.3 * outer, study.mu_int, 0.01)
@@ -172,12 +172,12 @@ def _prepared(study: Wheel) -> Simulation:
     return sim
 
 
-def _omega(study: Wheel) -> float:
-    """Spin of the wheel [rad/s]."""
+def omega_of(study: Wheel) -> float:
+    """Return the spin of the wheel [rad/s]."""
     return study.rpm * 2.0 * math.pi / 60.0
 
 
-def _bed_depth(study: Wheel) -> float:
+def bed_depth(study: Wheel) -> float:
     """Depth of the bed, in whole cells [m]."""
     return math.ceil(1.5 * study.outer / study.dx) * study.dx
 

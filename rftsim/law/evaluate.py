@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from rftsim.law.laws import RESPONSES
-from rftsim.law.layout import BED, BED_NUMBERS, GIVEN, HEADER, SAND, numbers_in, record
+from rftsim.law.layout import BED, BED_NUMBERS, GIVEN, HEADER, SAND, record
 from rftsim.machine import link
 from rftsim.surface.triangles import Array
 
@@ -38,10 +38,10 @@ def handle(bed: Array) -> "np.ndarray[tuple[int], np.dtype[np.int64]]":
     Args:
         bed: Packed sand, contiguous: a record of BED, and a packed terrain where its surface is a relief.
     """
-    numbers = np.zeros(numbers_in(SAND), dtype=np.int64)
-    numbers[0] = bed.ctypes.data
-    numbers[1] = bed.ctypes.data + 8 * BED_NUMBERS if bed.size > BED_NUMBERS else 0
-    return numbers
+    sand = np.zeros(1, dtype=SAND)
+    sand["bed"] = bed.ctypes.data
+    sand["terrain"] = bed.ctypes.data + 8 * BED_NUMBERS if bed.size > BED_NUMBERS else 0
+    return sand.view(np.int64)
 
 
 def triangle_stresses(

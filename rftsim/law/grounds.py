@@ -18,7 +18,7 @@ ALL_COLUMNS: Final = COLUMNS + 4
 
 
 class Ground(NamedTuple):
-    """What the loops ask of a free surface, for one response of the sand.
+    """A kind of free surface holds all that the loops ask of it, made for one response of the sand.
 
     Undisturbed depth [m], up, shape (3,), and the gradient of the height over the surface, shape (3,), come together.
     """

@@ -195,7 +195,7 @@ def pack_bed(
 
 
 def remember(bed: Array, marks: Ruts) -> None:
-    """Have packed sand remember ruts.
+    """Write into packed sand that it remembers ruts, and how large their cells and their window are.
 
     Raises:
         SandError: The sand's internal friction is unknown, whose angle is that at which heaps come to rest.

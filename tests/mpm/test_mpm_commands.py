@@ -15,6 +15,9 @@ STUDIES = [
     ["case", "4", "--quick", "--depth", "0.01", "--bed", "0.2", "0.1"],
     ["slope", "--quick", "--depth", "0.005", "--buried", "0.1"],
     ["wheel", "--quick", "--duration", "0.02"],
+    ["footprint", "--quick", "--bed", "0.3", "--speed", "0.4", "--rest", "0.05"],
+    ["blade", "--quick", "--travel", "0.04", "--bed", "0.7", "--speed", "0.2"],
+    ["rut", "--quick", "--rpm", "120", "--radius", "0.03", "--grousers", "8", "--height", "0.006"],
     ["collapse", "--quick", "--aspects", "0.5", "1.0", "--cells", "6"],
 ]
 
@@ -49,6 +52,9 @@ def test_the_same_for_people(capsys):
         (["drag", "--depths", "0.02"], "two depths"),
         (["wheel", "--grousers", "500"], "do not fit"),
         (["wheel", "--dx", "0.02"], "too thin"),
+        (["footprint", "--cells", "2"], "cells must be in"),
+        (["blade", "--thickness", "0.001"], "too thin"),
+        (["rut", "--rest", "-1"], "rest must be positive"),
         (["collapse", "--aspects", "-1"], "aspects must be positive"),
         (["campaign", "status", "absent"], "no campaign"),
         (["campaign", "run", "absent.toml", "out"], "cannot read absent.toml"),

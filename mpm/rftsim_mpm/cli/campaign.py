@@ -115,10 +115,11 @@ class CampaignStatus:
         if self.plot:
             from rftsim_mpm.plots import plot_campaign  # matplotlib is an extra
 
-            if not found.finished:
-                raise MpmError(f"the campaign in {self.folder} has no result to draw yet")
+            drawn = [one for one in results(self.folder) if "plate" in one or "push" in one]
+            if not drawn:
+                raise MpmError(f"the campaign in {self.folder} has no result to draw yet: plates and pushes are drawn")
             with replacing(self.plot) as temporary:
-                plot_campaign(results(self.folder), temporary)
+                plot_campaign(drawn, temporary)
         _say(self.folder, found, self.json, {})
 
 

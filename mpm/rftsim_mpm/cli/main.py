@@ -13,6 +13,7 @@ from rftsim_mpm.cli.case import CaseCommand
 from rftsim_mpm.cli.ends import ERRORS, REFUSED, STOPPED, parsed, said, terminable
 from rftsim_mpm.cli.plate import PlateCommand
 from rftsim_mpm.cli.push import PushCommand
+from rftsim_mpm.cli.ruts import BladeCommand, FootprintCommand, RutCommand
 from rftsim_mpm.cli.slope import SlopeCommand
 from rftsim_mpm.cli.studies import CollapseCommand, DragCommand, WheelCommand
 
@@ -22,6 +23,9 @@ Command = (
     | Annotated[PushCommand, tyro.conf.subcommand("push")]
     | Annotated[DragCommand, tyro.conf.subcommand("drag")]
     | Annotated[WheelCommand, tyro.conf.subcommand("wheel")]
+    | Annotated[FootprintCommand, tyro.conf.subcommand("footprint")]
+    | Annotated[BladeCommand, tyro.conf.subcommand("blade")]
+    | Annotated[RutCommand, tyro.conf.subcommand("rut")]
     | Annotated[CaseCommand, tyro.conf.subcommand("case")]
     | Annotated[CollapseCommand, tyro.conf.subcommand("collapse")]
     | Annotated[CampaignCommand, tyro.conf.subcommand("campaign")]
