@@ -10,8 +10,9 @@ from rftsim.machine.compiling import exact, inline
 from rftsim.machine.memory import doubles
 from rftsim.machine.table import Table
 
-TABLE_HEAD: Final = np.dtype([(name, "i8") for name in ("rows", "columns", "row", "column")])
-"""The head of a patch: how many rows and columns of cells it has, and the first of each, counted from the origin."""
+TABLE_HEAD: Final = np.dtype([(name, "i8") for name in ("rows", "columns", "row", "column", "has_targets")])
+"""The head of a patch: how many rows and columns of cells it has, and the first of each, counted from the origin;
+whether targets were found (0 or 1)."""
 _T: Final = Table(TABLE_HEAD, ("rows", "columns"))
 head = _T.head
 """Record TABLE_HEAD of the patch at p."""
@@ -22,8 +23,9 @@ lowest = _T.matrix("rows", "columns")
 mover = _T.matrix("rows", "columns")
 """Which body that is, by its place in the bed, (rows, columns)."""
 target = _T.matrix("rows", "columns")
-"""The cell that takes what is displaced, by its place in the patch, (rows, columns); -1 where none is known. Afterwards
-the heights between which sand slides."""
+"""The nearest cell that no body holds, by its place in the patch, where that was asked for, (rows, columns)."""
+level = _T.matrix("rows", "columns")
+"""Heights of the cells between which sand can slide [m], no numbers for others, (rows, columns)."""
 flow = _T.matrix("rows", "columns")
 """How much the sand of a cell rises [m], (rows, columns)."""
 lay_out, place = _T.layout(), _T.place()

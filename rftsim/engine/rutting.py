@@ -12,16 +12,18 @@ from rftsim.engine import bodies, instance, patch, slides, sweeps
 from rftsim.law import field as fields
 from rftsim.law import ruts
 from rftsim.law.body import bed_at, header_at
-from rftsim.law.layout import BLOCK_SIDE
+from rftsim.law.layout import BLOCK, BLOCK_SIDE, BOX_NUMBERS, prints_start
 from rftsim.law.vectors import to_world
 from rftsim.machine.compiling import exact
 from rftsim.machine.memory import doubles, release, stack_doubles, take
 from rftsim.solver.motion import size_of
 
-PART: Final = 0.25
+PART: Final = 0.5
 """How far a body may move before its marks are made [cells]."""
 SLIDING: Final = 0.01
 """Time between two goes at sand that slides [s]."""
+NEAR: Final = 2.0
+"""Height over the sand at which prints are looked at [cells]."""
 MARGIN: Final = 4
 """Cells about what bodies cover that are looked at."""
 _TABLE: Final = patch.TABLE
@@ -58,16 +60,42 @@ def _is_due(model, m, t, address, marks, head, h):
 
 
 @exact
+def _join_block(t, body, field, marks, box, out):
+    """Widen a box of cells by those below a block of a body's prints, by its box, where that is near the sand."""
+    r, at = t.xmat[9 * body : 9 * body + 9], t.xpos[3 * body : 3 * body + 3]
+    x, y, z = to_world(r, box[0], box[1], box[2])
+    x, y, z, wide = x + at[0], y + at[1], z + at[2], doubles(stack_doubles(3), 3)
+    for k in range(3):
+        wide[k] = abs(r[3 * k]) * box[3] + abs(r[3 * k + 1]) * box[4] + abs(r[3 * k + 2]) * box[5]
+    height, along, across = fields.surface_over(field, x, y)
+    height += ruts.height(marks, x, y) + abs(along) * wide[0] + abs(across) * wide[1]
+    if not z - wide[2] <= height + NEAR * marks.spacing:
+        return
+    cells = doubles(stack_doubles(4), 4)
+    cells[0], cells[1] = ruts.cell(y - wide[1], marks.spacing), ruts.cell(x - wide[0], marks.spacing)
+    cells[2], cells[3] = ruts.cell(y + wide[1], marks.spacing) + 1, ruts.cell(x + wide[0], marks.spacing) + 1
+    _join(out, cells)
+
+
+@exact
 def _covers(model, m, t, address, k, field, marks, out):
-    """Fill out with the rows and columns that the k-th body covers, first and behind the last, (4,); if it is near."""
-    box, reach = doubles(stack_doubles(6), 6), BLOCK_SIDE * marks.spacing
-    _box(t, instance.body(address, k), instance.surface(model, m, address, k), box)
+    """Fill out with the rows and columns of cells that the k-th body is near to, (4,); whether there are any."""
+    body, surface, box = instance.body(address, k), instance.surface(model, m, address, k), doubles(stack_doubles(6), 6)
+    for axis in range(4):
+        out[axis] = 0.0
+    _box(t, body, surface, box)
     x, y = 0.5 * (box[0] + box[3]), 0.5 * (box[1] + box[4])
     height, along, across = fields.surface_over(field, x, y)
     rise = abs(along) * 0.5 * (box[3] - box[0]) + abs(across) * 0.5 * (box[4] - box[1])
-    out[0], out[1] = ruts.cell(box[1], marks.spacing), ruts.cell(box[0], marks.spacing)
-    out[2], out[3] = ruts.cell(box[4], marks.spacing) + 1, ruts.cell(box[3], marks.spacing) + 1
-    return box[2] <= height + rise + reach
+    if not box[2] <= height + rise + BLOCK_SIDE * marks.spacing:
+        return False
+    header = header_at(surface)
+    n = int(header.prints)
+    count = (n + BLOCK - 1) // BLOCK
+    boxes = doubles(surface + 8 * (prints_start(header) + 3 * n), BOX_NUMBERS * count)
+    for block in range(count):
+        _join_block(t, body, field, marks, boxes[BOX_NUMBERS * block : BOX_NUMBERS * (block + 1)], out)
+    return out[2] > out[0]
 
 
 @exact
@@ -155,6 +183,16 @@ def _lay_out(p, marks, box):
 
 
 @exact
+def _is_over(p, t, marks, body, surface):
+    """Whether a body's box lies over cells of a patch."""
+    box, head = doubles(stack_doubles(6), 6), patch.head(p)
+    _box(t, body, surface, box)
+    apart = ruts.cell(box[4], marks.spacing) < head.row or ruts.cell(box[1], marks.spacing) >= head.row + head.rows
+    beside = ruts.cell(box[3], marks.spacing) < head.column
+    return not (apart or beside or ruts.cell(box[0], marks.spacing) >= head.column + head.columns)
+
+
+@exact
 def _work(model, m, t, address, field, head, marks, box, repose):
     """Mark and slide in a box of cells, first row and column and behind the last, (4,)."""
     p = stack_doubles(_TABLE)
@@ -163,9 +201,12 @@ def _work(model, m, t, address, field, head, marks, box, repose):
     if memory == 0:
         return
     patch.place(p, memory)
+    patch.head(p).has_targets = 0
     top = _fill_heights(p, field, marks)
     for k in range(instance.head(address).nbody):
-        sweeps.press(p, t, marks, top, instance.body(address, k), k, instance.surface(model, m, address, k))
+        body, surface = instance.body(address, k), instance.surface(model, m, address, k)
+        if _is_over(p, t, marks, body, surface):
+            sweeps.press(p, t, marks, top, body, k, surface)
     head.moved += sweeps.lower(model, m, t, address, p, marks, repose)
     slid, on = slides.settle(p, marks, repose), doubles(stack_doubles(4), 4)
     on[0], on[1] = patch.head(p).row + slid[0], patch.head(p).column + slid[1]

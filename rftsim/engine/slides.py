@@ -14,11 +14,10 @@ from rftsim.law.vectors import larger
 from rftsim.machine.compiling import exact, inline, loop
 from rftsim.machine.memory import peek, poke
 
-PASSES: Final = 12
+PASSES: Final = 8
 """Passes over a patch in one go; what is not at rest by then goes on sliding the next time."""
-SHARE: Final = 0.2
-"""Share of what is too much that moves over an edge in a pass; a cell has eight, and more than 2/9 would not come to
-rest."""
+SHARE: Final = 0.15
+"""Share of what is too much that moves over an edge in a pass; with more than a sixth, stripes of cells would grow."""
 REST: Final = 0.97
 """Slope at which what slides comes to rest, over that at which it begins."""
 _DIAGONAL: Final = 2.0**0.5
@@ -54,7 +53,7 @@ def _row(level, flow, start, count, columns, steepest):
 @exact
 def _fill_levels(p, gap):
     """Fill the heights of the cells from and to which sand can slide; no numbers for those held, and for the edge."""
-    level, height, rows, columns = patch.target(p), patch.height(p), patch.head(p).rows, patch.head(p).columns
+    level, height, rows, columns = patch.level(p), patch.height(p), patch.head(p).rows, patch.head(p).columns
     for i in range(rows):
         for j in range(columns):
             is_edge = i == 0 or j == 0 or i == rows - 1 or j == columns - 1
@@ -64,7 +63,7 @@ def _fill_levels(p, gap):
 @exact
 def _pass(p, steepest, box):
     """Let the sand in a box of cells slide once, first row and column and behind the last; what to look at next."""
-    columns, level, flow = patch.head(p).columns, patch.flat(p, patch.target(p)), patch.flat(p, patch.flow(p))
+    columns, level, flow = patch.head(p).columns, patch.flat(p, patch.level(p)), patch.flat(p, patch.flow(p))
     low, high = (patch.head(p).rows, columns), (0, 0)
     for i in range(box[0], box[2]):
         start = i * columns
@@ -92,7 +91,7 @@ def _wider(p, box):
 @exact
 def settle(p, marks, repose):
     """Let the sand of a patch slide for some passes, at the tangent of its repose; the box of what still slides."""
-    head, height, level = patch.head(p), patch.height(p), patch.target(p)
+    head, height, level = patch.head(p), patch.height(p), patch.level(p)
     _fill_levels(p, ruts.GAP * marks.spacing)
     box, touched = (1, 1, head.rows - 1, head.columns - 1), (head.rows, head.columns, 0, 0)
     for _ in range(PASSES):
@@ -110,4 +109,5 @@ def settle(p, marks, repose):
         for j in range(touched[1], touched[3]):
             if level[i, j] == level[i, j] and level[i, j] != height[i, j]:
                 patch.raise_cell(p, marks, i, j, level[i, j] - height[i, j])
-    return box
+    is_out = touched[0] <= 1 or touched[1] <= 1 or touched[2] >= head.rows - 1 or touched[3] >= head.columns - 1
+    return touched if is_out and touched[2] > touched[0] else box

@@ -1,4 +1,4 @@
-"""What bodies sweep: the sand is lowered to the lowest point of a body over each cell, and lies beside it afterwards.
+"""Bodies sweep sand: it is lowered to the lowest point of a body over each cell, and lies beside it afterwards.
 
 What is displaced goes to the nearest cell that no body holds; where the body's surface moves across the sand rather
 than into it, to the nearest before it. What a body rolls over, so that its surface moves less along the level than its
@@ -17,6 +17,8 @@ from rftsim.law.vectors import to_world
 from rftsim.machine.compiling import exact, inline
 from rftsim.machine.memory import doubles, peek, stack_doubles
 
+RINGS: Final = 3
+"""Rings of cells about one in which the nearest that no body holds is looked for first."""
 ACROSS: Final = 0.5
 """Share of a surface's speed along the level from which on it pushes the sand ahead by a cell."""
 
@@ -37,23 +39,24 @@ def press(p, t, marks, top, body, k, surface):
         if not at[2] + middle - half <= top:
             continue
         for i in range(start, min(start + BLOCK, n)):
-            x, y, z = to_world(r, peek(numbers, i), peek(numbers, i + n), peek(numbers, i + 2 * n))
-            row = ruts.cell(y + at[1], marks.spacing) - patch.head(p).row
-            column = ruts.cell(x + at[0], marks.spacing) - patch.head(p).column
-            if 0 <= row < rows and 0 <= column < columns and z + at[2] < lowest[row, column]:
-                lowest[row, column], mover[row, column] = z + at[2], k
+            x, y, z = peek(numbers, i), peek(numbers, i + n), peek(numbers, i + 2 * n)
+            low = at[2] + r[6] * x + r[7] * y + r[8] * z
+            if not low <= top:
+                continue
+            row = ruts.cell(at[1] + r[3] * x + r[4] * y + r[5] * z, marks.spacing) - patch.head(p).row
+            column = ruts.cell(at[0] + r[0] * x + r[1] * y + r[2] * z, marks.spacing) - patch.head(p).column
+            if 0 <= row < rows and 0 <= column < columns and low < lowest[row, column]:
+                lowest[row, column], mover[row, column] = low, k
 
 
 @exact
 def _find_targets(p, gap):
-    """Fill the nearest cell that no body holds, for each; whether there is any. Passes down and up, to neighbours."""
+    """Fill the nearest cell that no body holds, for each; -1 where there is none. Passes down and up, to neighbours."""
     target, rows, columns = patch.target(p), patch.head(p).rows, patch.head(p).columns
-    found = False
+    patch.head(p).has_targets = 1
     for i in range(rows):
         for j in range(columns):
-            is_free = not patch.is_held(p, i, j, gap)
-            target[i, j] = i * columns + j if is_free else -1.0
-            found = found or is_free
+            target[i, j] = -1.0 if patch.is_held(p, i, j, gap) else i * columns + j
     for way in (1, -1):
         for a in range(rows):
             i = a if way == 1 else rows - 1 - a
@@ -66,7 +69,6 @@ def _find_targets(p, gap):
             for b in range(columns):
                 j = columns - 1 - b if way == 1 else b
                 _take_nearer(p, i, j, i, j + way)
-    return found
 
 
 @inline
@@ -85,6 +87,53 @@ def _take_nearer(p, i, j, a, b):
         return
     if target[i, j] < 0.0 or _distance2(p, i, j, target[a, b]) < _distance2(p, i, j, target[i, j]):
         target[i, j] = target[a, b]
+
+
+@exact
+def _nearest2(p, i, j, gap):
+    """The square of the distance from a cell to the nearest that no body holds, within RINGS [cells]; else -1."""
+    rows, columns, best = patch.head(p).rows, patch.head(p).columns, -1
+    for ring in range(RINGS + 1):
+        if 0 <= best <= ring * ring:
+            break
+        for a in range(max(i - ring, 0), min(i + ring + 1, rows)):
+            step = 1 if abs(a - i) == ring else max(2 * ring, 1)
+            for b in range(j - ring, j + ring + 1, step):
+                away = (a - i) * (a - i) + (b - j) * (b - j)
+                if 0 <= b < columns and (best < 0 or away < best) and not patch.is_held(p, a, b, gap):
+                    best = away
+    return best
+
+
+@exact
+def _drop_far(p, i, j, depth, steepest, gap):
+    """Drop sand on the nearest cell that no body holds, farther than RINGS; whether there is any."""
+    if patch.head(p).has_targets == 0:
+        _find_targets(p, gap)
+    cell, columns = int(patch.target(p)[i, j]), patch.head(p).columns
+    if cell < 0:
+        return False
+    _drop(p, cell // columns, cell % columns, depth, steepest, gap)
+    return True
+
+
+@exact
+def _spread(p, i, j, depth, steepest, gap):
+    """Drop sand on the cells nearest to one that no body holds, on all of them the same; whether there is any."""
+    rows, columns, away = patch.head(p).rows, patch.head(p).columns, _nearest2(p, i, j, gap)
+    if away < 0:
+        return _drop_far(p, i, j, depth, steepest, gap)
+    reach, count = int(np.sqrt(float(away))) + 1, 0
+    for counting in (True, False):
+        for a in range(max(i - reach, 0), min(i + reach + 1, rows)):
+            for b in range(max(j - reach, 0), min(j + reach + 1, columns)):
+                if (a - i) * (a - i) + (b - j) * (b - j) != away or patch.is_held(p, a, b, gap):
+                    continue
+                if counting:
+                    count += 1
+                else:
+                    _drop(p, a, b, depth / count, steepest, gap)
+    return True
 
 
 @exact
@@ -166,24 +215,21 @@ def _roll_over(p, i, j, motion, depth, steepest, gap):
 
 @exact
 def _push(p, i, j, motion, depth, steepest, gap):
-    """Let the nearest cell rise that no body holds: before the body, where that moves across the sand."""
+    """Let the nearest cells rise that no body holds: before the body, where it moves across; whether there are any."""
     rows, columns = patch.head(p).rows, patch.head(p).columns
     speed = np.sqrt(motion[0] * motion[0] + motion[1] * motion[1] + motion[2] * motion[2])
     row = i + (1 if motion[1] > ACROSS * speed else (-1 if motion[1] < -ACROSS * speed else 0))
     column = j + (1 if motion[0] > ACROSS * speed else (-1 if motion[0] < -ACROSS * speed else 0))
-    cell = int(patch.target(p)[min(max(row, 0), rows - 1), min(max(column, 0), columns - 1)])
-    _drop(p, cell // columns, cell % columns, depth, steepest, gap)
+    row, column = min(max(row, 0), rows - 1), min(max(column, 0), columns - 1)
+    return _spread(p, row, column, depth, steepest, gap)
 
 
 @exact
 def lower(model, m, t, address, p, marks, repose):
     """Lower the sand to what bodies have swept, and raise it beside them; the volume that was displaced [m^3]."""
-    height, lowest = patch.height(p), patch.lowest(p)
+    height, lowest, flow = patch.height(p), patch.lowest(p), patch.flow(p)
     rows, columns, gap = patch.head(p).rows, patch.head(p).columns, ruts.GAP * marks.spacing
-    if not _find_targets(p, gap):
-        return 0.0
-    flow, displaced, motion = patch.flow(p), 0.0, doubles(stack_doubles(5), 5)
-    steepest = repose * marks.spacing
+    displaced, motion, steepest = 0.0, doubles(stack_doubles(5), 5), repose * marks.spacing
     for i in range(rows):
         for j in range(columns):
             flow[i, j] = 0.0
@@ -193,9 +239,10 @@ def lower(model, m, t, address, p, marks, repose):
             if not depth > 0.0:
                 continue
             _motion(model, m, t, address, p, i, j, marks, motion)
-            flow[i, j] -= depth
             under = _roll_over(p, i, j, motion, depth, steepest, gap)
-            _push(p, i, j, motion, depth - under, steepest, gap)
+            if not _push(p, i, j, motion, depth - under, steepest, gap):
+                depth = under  # nowhere to go in this patch: it stays, until the body has moved on
+            flow[i, j] -= depth
             displaced += depth
     if displaced > 0.0:
         for i in range(rows):

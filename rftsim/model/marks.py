@@ -13,6 +13,8 @@ SOLE: Final = 0.05
 """Part of a body's size, from below, whose outline is what presses."""
 NARROWEST: Final = 1.0 / 3.0
 """The narrowest that presses, over the second of a body's three extents: a blade's edge tells nothing of its reach."""
+COARSEST: Final = 1.0 / 12.0
+"""The narrowest that presses, over the size of the largest body: its cells are no finer, whatever they cost."""
 PRESSING: Final = 0.25
 """Bodies press whose lowest point lies no higher above the lowest of all than this part of the largest body's size."""
 
@@ -35,7 +37,8 @@ def marks_for(data: mujoco.MjData, model: mujoco.MjModel, surfaces: Mapping[str,
     width = min(_width(corners[name]) for name in pressing)
     everything = np.concatenate(list(corners.values()))
     x, y = np.ptp(everything[:, :2], axis=0).tolist()
-    return ruts_for(width, (x, y))
+    largest = max(surface.size for surface in surfaces.values())
+    return ruts_for(max(width, COARSEST * largest), (x, y))
 
 
 def _width(points: Array) -> float:

@@ -5,7 +5,7 @@ import numpy as np
 from rftsim.surface.splitting import split
 from rftsim.surface.triangles import Array, Surface
 
-FINENESS = 4.0
+FINENESS = 1.5
 """Points nearer to each other than this part of a cell count as one."""
 
 
