@@ -157,7 +157,7 @@ def laid(monkeypatch):
     def lay(surface, ruts=None, places=((0.0, 0.0, 0.5),)):
         spec = mujoco.MjSpec.from_string(BALL)
         draft = make_draft(spec)
-        rftsim.add_sand(spec, draw=False, terrain=-10.0)
+        rftsim.add_sand(spec, draw=False, terrain=-10.0, ruts=ruts or False)
         drawing.write_drawing(spec, "sand", getattr(surface, "under", surface), draft, ruts)
         for module in (fields, cameras):
             monkeypatch.setattr(module, "ground", lambda model, data, bed: surface)

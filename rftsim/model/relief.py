@@ -83,9 +83,8 @@ def make_levels(terrain: FreeSurface | Terrain, marks: Fineness | None, grain: f
     relief, whole = math.inf, 2.0 * REACH * extent
     if isinstance(terrain, Terrain):
         shape = np.array(terrain.heights.shape[::-1]) * terrain.spacing
-        spacing = min(terrain.spacing) / SMOOTH
-        own = Fineness(spacing, ENDLESS * spacing if terrain.repeat else float(shape.max()))
-        relief, marks = _power(own.spacing, grain, math.floor), marks or own
+        relief = _power(min(terrain.spacing) / SMOOTH, grain, math.floor)
+        marks = marks or Fineness(relief, ENDLESS * relief if terrain.repeat else float(shape.max()))
     assert marks is not None, "a plane without marks needs no fields"
     found = [_finest(marks, grain)]
     while found[-1].width < whole:

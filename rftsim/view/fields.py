@@ -55,6 +55,7 @@ class _Bed:
         self._levels = [_level(model, geom) for geom in self._geoms]
         cell = self._levels[0].cell
         self._grain = cell * 2.0 ** round(math.log2(period(model, self._geoms[0]) / cell))  # exactly, as it was made
+        self._marked = bool(layout.ruts_size(bed.bed))
         self._sampled: list[Field] = []
         self._numbers = np.empty(0)
         self._shown: list[Field | None] = [None] * len(self._geoms)
@@ -62,24 +63,28 @@ class _Bed:
         model.geom_sameframe[self._geoms] = int(mujoco.mjtSameFrame.mjSAMEFRAME_NONE)
 
     def follow(self, data: mujoco.MjData) -> list[int]:
+        """Take over what the data say of this bed; ids of the height fields that changed."""
         surface = ground(self._model, data, self._bed.name)
         self._forget()
         around = centres(self._levels, self._focus(surface, data), self._grain)
-        self._sampled = [
-            sample_field(level, centre, surface.undisturbed_at if k else surface.height_at)
-            if self._stale(k, centre)
-            else self._sampled[k]
-            for k, (level, centre) in enumerate(zip(self._levels, around, strict=True))
-        ]
-        fields = join_fields(self._levels, self._sampled)
-        changed = [self._write(k, field) for k, field in enumerate(fields) if self._differs(k, field)]
+        stale = [self._stale(k, centre) for k, centre in enumerate(around)]
+        changed = self._look(surface, around, stale) if any(stale) else []
         self._model.geom_pos[self._geoms] = data.geom_xpos[self._geoms] = self._places
         return changed
+
+    def _look(self, surface: Ground, around: Array, stale: Sequence[bool]) -> list[int]:
+        """Look fields up about their centres, (n, 2), and draw those that differ; ids of their height fields."""
+        self._sampled = [
+            sample_field(level, centre, surface.undisturbed_at if k else surface.height_at) if old else self._sampled[k]
+            for k, (level, centre, old) in enumerate(zip(self._levels, around, stale, strict=True))
+        ]
+        fields = join_fields(self._levels, self._sampled)
+        return [self._write(k, field) for k, field in enumerate(fields) if self._differs(k, field)]
 
     def _focus(self, surface: Ground, data: mujoco.MjData) -> Array:
         """The middle of where marks are, or of the bodies where there are none, x and y [m]."""
         places: Array = data.xpos[list(self._bed.bodies), :2]
-        if surface.window is not None and layout.ruts_size(self._bed.bed):
+        if self._marked and surface.window is not None:
             places = np.array(surface.window)
         return np.asarray(places.mean(axis=0))
 
@@ -91,8 +96,8 @@ class _Bed:
             self._sampled, self._numbers = [], numbers
 
     def _stale(self, k: int, centre: Array) -> bool:
-        """Whether a field has to be looked up: the finest, which alone shows marks, always; others at another place."""
-        return k == 0 or not self._sampled or (self._sampled[k].centre != centre).any()
+        """Whether a field has to be looked up: at another place, and the finest, which alone shows marks, for these."""
+        return (k == 0 and self._marked) or not self._sampled or (self._sampled[k].centre != centre).any()
 
     def _differs(self, k: int, field: Field) -> bool:
         """Whether a field is another than the one that is drawn."""
