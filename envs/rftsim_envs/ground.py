@@ -6,9 +6,9 @@ from typing import Final, NamedTuple
 import mujoco
 import numpy as np
 
+from rftsim.law import layout
 from rftsim.model.add_sand import WHOLE, add_sand
 from rftsim.model.readout import instances
-from rftsim.law import layout
 from rftsim_envs.physics import Physics
 from rftsim_envs.relief import LEVEL, Relief
 from rftsim_envs.task import Config, Task

@@ -62,4 +62,5 @@ class Placer:
 
     def _ground(self, i: int, points: Array) -> Array:
         """Height of the ground over points (3, k) [m], (k,)."""
-        return self._relief.height(points[:1], points[1:2], [i])[0]
+        heights: Array = self._relief.height(points[:1], points[1:2], [i])[0]
+        return heights

@@ -190,7 +190,7 @@ def spline(
 
 
 def _weights(t: Array, count: int, repeat: bool) -> tuple[Any, Array, Array]:
-    """Of places in spacings: the first of three padded coefficients, their weights, and their derivatives', (3, ...)."""
+    """Of places in spacings: the first of three padded coefficients, and (3, ...) their weights, and derivatives'."""
     if repeat:
         t = t - count * np.floor(t / count)
     t = np.clip(t, -2.0, count + 1.0)
