@@ -46,7 +46,7 @@ class Relief:
 
     @property
     def is_level(self) -> bool:
-        """Whether there is no terrain."""
+        """Whether the ground is level, at z = 0."""
         return self._heads is None
 
     def move(self, i: int, rng: np.random.Generator) -> None:

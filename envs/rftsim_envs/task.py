@@ -110,7 +110,7 @@ class Config:
 
     @property
     def has_dunes(self) -> bool:
-        """Whether the ground has relief."""
+        """Whether the ground has the relief of dunes."""
         return self.terrain == "dunes" and self.amplitude > 0.0
 
     @property

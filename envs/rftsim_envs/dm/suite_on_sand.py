@@ -110,8 +110,9 @@ class OnSand(WholeSteps):
         model, data = self.model.ptr, self.data.ptr
         terrain, (bed,) = field_terrain(model, data, self.floors.field), instances(model)
         assert bed.relief is not None, "sand in the place of a height field has relief"
-        level = isinstance(terrain, FreeSurface)
-        bed.relief[TERRAIN_NUMBERS:] = terrain.height if level else terrain.coefficients.ravel()
+        bed.relief[TERRAIN_NUMBERS:] = (
+            terrain.height if isinstance(terrain, FreeSurface) else terrain.coefficients.ravel()
+        )
 
     @contextlib.contextmanager
     def _solid(self, solid: bool) -> Iterator[None]:
@@ -178,20 +179,22 @@ def _is_blank(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> bool:
     if geom.type != mujoco.mjtGeom.mjGEOM_HFIELD or not (geom.contype or geom.conaffinity):
         return False
     field = spec.hfield(geom.hfieldname)
-    return not field.file and not len(field.userdata)
+    return not field.file and not np.diff(field.userdata).any()
 
 
 def _turn_blank(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, recipe: Recipe) -> None:
     """Turn a height field without heights, and floors at its level, to sand that can take any; no triangle is spared.
 
-    While the sand is written the field has heights that are next to nothing, as a level one would count as a plane.
+    It stays in sight, of cameras and rangefinders, in place of a drawing of the sand. While the sand is written the
+    field has heights that are next to nothing, as a level one would count as a plane.
     """
-    field, options = spec.hfield(geom.hfieldname), {"terrain": geom.name, "reduction": 0.0, **recipe.options}
-    size = np.array(field.size)
+    options = {"terrain": geom.name, "reduction": 0.0, "draw": False, **recipe.options}
+    field, colour = spec.hfield(geom.hfieldname), np.array(geom.rgba)
+    size, heights = np.array(field.size), np.array(field.userdata)
     field.userdata = np.linspace(0.0, 1.0, field.nrow * field.ncol)
     field.size = [*size[:2], FLAT, size[3]]
     turn_to_sand(spec, recipe._replace(options=options))
-    field.userdata, field.size = [], size
+    field.userdata, field.size, geom.rgba = heights, size, colour
 
 
 @functools.cache
