@@ -10,9 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import rftsim
+from rftsim.law import layout
 from rftsim.model import drawing, relief
 from rftsim.model.draft import make_draft
-from rftsim.view import cameras, ground, look, render
+from rftsim.view import cameras, fields, look, render
 from rftsim.view.drawing import Shown
 
 EXTENT = 0.5
@@ -33,12 +34,17 @@ class Rutted:
 
     under: rftsim.FreeSurface | rftsim.Terrain
     place: float = 0.0
+    window: None = None
+
+    def undisturbed_at(self, x, y):
+        return self.under.height_at(x, y)
 
     def height_at(self, x, y):
         return self.under.height_at(x, y) - 0.03 * np.exp(-(((y - self.place) / 0.03) ** 2))
 
 
-MARKS = relief.Fineness(0.0125, 1.2)
+RUTS = rftsim.Ruts(0.0125, (1.6, 0.8))
+MARKS = relief.Fineness(0.0125, 1.6)
 GROUNDS = {
     "dunes": (dunes(), None),
     "dunes that end": (dunes(False), None),
@@ -47,7 +53,7 @@ GROUNDS = {
 }
 
 
-def fields(name, focus):
+def sampled(name, focus):
     under, marks = GROUNDS[name]
     levels = relief.make_levels(under, marks, GRAIN, EXTENT)
     surface = under if marks is None else Rutted(under)
@@ -67,8 +73,8 @@ def within(points, level, field, margin=0.0):
 
 @pytest.mark.parametrize("name", GROUNDS)
 def test_what_is_seen_lies_on_the_ground(name):
-    """Vertices lie on it exactly where no finer field is above them, except on rims, on the coarser field's edges."""
-    levels, found, surface = fields(name, (1.3, -0.7))
+    """Vertices lie on it exactly where no finer field is above them, except on rims, just below the coarser field."""
+    levels, found, surface = sampled(name, (1.3, -0.7))
     for k, (level, field) in enumerate(zip(levels, found, strict=True)):
         points = vertices(level, field)
         inner = (
@@ -82,14 +88,14 @@ def test_what_is_seen_lies_on_the_ground(name):
 
 @pytest.mark.parametrize("name", GROUNDS)
 def test_a_finer_field_is_not_hidden_by_the_coarser_one_and_joins_it(name):
-    levels, found, _ = fields(name, (0.4, 2.2))
+    levels, found, _ = sampled(name, (0.4, 2.2))
     for fine, inner, coarse, outer in zip(levels, found, levels[1:], found[1:], strict=False):
         points, edge = vertices(fine, inner), 1e-9 + coarse.cell
         drawn = heights_of(coarse, outer, points)
         middle = within(points, fine, inner, edge)
         assert (drawn[middle] < points[middle][:, 2]).all()
         rim = ~within(points, fine, inner, 0.5 * fine.cell)
-        assert points[rim][:, 2] == pytest.approx(drawn[rim], abs=1e-9)
+        assert points[rim][:, 2] == pytest.approx(drawn[rim] - relief.SKIRT * fine.cell, abs=1e-9)
 
 
 def heights_of(level, field, points):
@@ -120,8 +126,8 @@ def test_fields_move_by_whole_periods_of_the_grain_and_stay_over_one_another(x, 
 
 
 def test_a_field_that_has_moved_shows_the_same_heights():
-    levels, before, _ = fields("ruts in dunes", (0.0, 0.0))
-    _, after, _ = fields("ruts in dunes", (0.45, -0.31))
+    levels, before, _ = sampled("ruts in dunes", (0.0, 0.0))
+    _, after, _ = sampled("ruts in dunes", (0.45, -0.31))
     for level, one, other in zip(levels[:1], before, after, strict=False):
         shift = np.rint((other.centre - one.centre) / level.cell).astype(int)
         assert shift.any()
@@ -148,13 +154,13 @@ BARE = Shown(False, False, False)
 def laid(monkeypatch):
     """Lays a surface under a ball and draws it as it is; the model, and data with the ball at some places."""
 
-    def lay(surface, marks=None, places=((0.0, 0.0, 0.5),)):
+    def lay(surface, ruts=None, places=((0.0, 0.0, 0.5),)):
         spec = mujoco.MjSpec.from_string(BALL)
         draft = make_draft(spec)
         rftsim.add_sand(spec, draw=False, terrain=-10.0)
-        drawing.write_drawing(spec, "sand", getattr(surface, "under", surface), draft, marks)
-        for module in (ground, cameras):
-            monkeypatch.setattr(module, "surface_of", lambda model, data, bed: surface)
+        drawing.write_drawing(spec, "sand", getattr(surface, "under", surface), draft, ruts)
+        for module in (fields, cameras):
+            monkeypatch.setattr(module, "ground", lambda model, data, bed: surface)
         model = spec.compile()
         return model, [at(model, place) for place in places]
 
@@ -193,8 +199,8 @@ def test_a_model_is_compiled_with_its_terrain_drawn_and_keeps_its_statistics(lai
 
 def test_following_draws_the_sand_and_changes_nothing_else(laid):
     surface = Rutted(dunes())
-    model, (near, far) = laid(surface, MARKS, ((0.0, 0.0, 0.5), (3.0, -2.0, 0.5)))
-    before, own = copy.copy(model), ground.Ground(model)
+    model, (near, far) = laid(surface, RUTS, ((0.0, 0.0, 0.5), (3.0, -2.0, 0.5)))
+    before, own = copy.copy(model), fields.Fields(model)
     own.follow(near)
     assert own.follow(near) == []
     changed = own.follow(far)
@@ -219,8 +225,8 @@ def same(one, other):
 
 def test_a_mark_changes_the_finest_field_alone(laid):
     surface = Rutted(rftsim.FreeSurface(), place=0.3)
-    model, (data,) = laid(surface, MARKS)
-    own = ground.Ground(model)
+    model, (data,) = laid(surface, RUTS)
+    own = fields.Fields(model)
     own.follow(data)
     surface.place = 0.32
     assert own.follow(data) == [int(model.geom("sand_surface").dataid[0])]
@@ -236,10 +242,10 @@ def seen(model, data, camera, shown=BARE):
     return render.render(model, data, camera=camera, width=320, height=240, shown=shown).astype(int)
 
 
-@pytest.mark.parametrize(("surface", "marks"), [(rftsim.FreeSurface(), None), (Rutted(rftsim.FreeSurface()), MARKS)])
-def test_the_ground_stays_in_place_while_what_is_followed_moves(laid, surface, marks):
+@pytest.mark.parametrize(("surface", "ruts"), [(rftsim.FreeSurface(), None), (Rutted(rftsim.FreeSurface()), RUTS)])
+def test_the_ground_stays_in_place_while_what_is_followed_moves(laid, surface, ruts):
     """Two pictures by one camera, with the ball, and with it the fields, at two places outside of the pictures."""
-    model, states = laid(surface, marks, ((0.9, -1.2, 0.3), (1.3, -1.1, 0.3)))
+    model, states = laid(surface, ruts, ((0.9, -1.2, 0.3), (1.3, -1.1, 0.3)))
     one, other = (seen(model, data, above()) for data in states)
     grey = np.abs(one - other).max(axis=2)
     assert np.quantile(grey, 0.98) <= 3
@@ -260,7 +266,7 @@ def test_what_lies_in_a_rut_is_seen_and_what_is_buried_is_not(laid):
     """A ball 2 cm below the undisturbed surface, in a rut of 3 cm and beside it."""
     surface = Rutted(dunes())
     places = [(0.0, y, surface.under.height_at(0.0, y) - 0.062) for y in (0.0, 0.2)]
-    model, states = laid(surface, MARKS, places)
+    model, states = laid(surface, RUTS, places)
     red = [(picture[..., 0] - picture[..., 2]).max() for picture in (seen(model, data, above()) for data in states)]
     assert red[0] > 120 > red[1]
 
@@ -278,3 +284,35 @@ def test_far_away_the_ground_is_even_and_goes_over_into_the_sky(laid):
     assert (np.diff(towards_sky[edge : edge + 40]) > -0.5).all()
     assert rough[edge + 2 : edge + 20].max() < 0.5
     assert rough[-20:].min() > 2.0
+
+
+def test_what_the_sand_remembers_is_drawn_and_forgotten_with_it():
+    """A ball that falls into sand with ruts leaves a print in the drawing, which a reset takes away."""
+    model = rftsim.load(BALL, terrain=0.1, ruts=RUTS)
+    data, own = mujoco.MjData(model), fields.Fields(model)
+    own.follow(data)
+    mujoco.mj_step(model, data, nstep=500)
+    assert own.follow(data)
+    now = rftsim.ground(model, data)
+    print_ = drawn_vertices(model, model.geom("sand_surface").id)[1:-1, 1:-1]
+    assert print_[..., 2] == pytest.approx(now.height_at(print_[..., 0], print_[..., 1]), abs=1e-6)
+    assert print_[..., 2].min() < 0.1 - 0.005 < 0.1 < print_[..., 2].max()
+    mujoco.mj_resetData(model, data)
+    mujoco.mj_forward(model, data)
+    assert own.follow(data)
+    points = drawn_vertices(model, model.geom("sand_surface").id)[1:-1, 1:-1]
+    assert points[..., 2] == pytest.approx(0.1, abs=1e-6)
+
+
+def test_terrain_that_is_moved_in_place_is_drawn_where_it_is():
+    """As environments move it from episode to episode."""
+    model = rftsim.load(BALL, terrain=dunes())
+    data, own = mujoco.MjData(model), fields.Fields(model)
+    mujoco.mj_forward(model, data)
+    own.follow(data)
+    assert own.follow(data) == []
+    relief_ = layout.record(rftsim.instances(model)[0].relief, layout.TERRAIN)
+    relief_.x += 0.7
+    assert len(own.follow(data)) == len(look.sand_geoms(model))
+    points = drawn_vertices(model, model.geom("sand_surface").id)[1:-1, 1:-1]
+    assert points[..., 2] == pytest.approx(dunes().height_at(points[..., 0] - 0.7, points[..., 1]), abs=1e-6)

@@ -17,13 +17,16 @@ SPACING = 0.02
 class Pressed:
     """Waves of 1 cm, with a print 2 cm deep at the origin once it is deep."""
 
-    spacing = SPACING
+    spacing = SPACING, SPACING
 
     def __init__(self):
         self.deep = 0.0
 
+    def undisturbed_at(self, x, y):
+        return 0.01 * np.sin(5.0 * x) * np.cos(4.0 * y)
+
     def height_at(self, x, y):
-        return 0.01 * np.sin(5.0 * x) * np.cos(4.0 * y) - self.deep * np.exp(-(x**2 + y**2) / 0.05**2)
+        return self.undisturbed_at(x, y) - self.deep * np.exp(-(x**2 + y**2) / 0.05**2)
 
 
 def rows(path):
@@ -44,7 +47,7 @@ def rows(path):
 def recorded(tmp_path, monkeypatch):
     """A recording of 1 s in which a print is pressed at 0.45 s; the surface, and the rows of each tile."""
     surface, path = Pressed(), tmp_path / "x.rrd"
-    monkeypatch.setattr(frames, "surface_of", lambda model, data, bed: surface)
+    monkeypatch.setattr(frames, "ground", lambda model, data, bed: surface)
     model = rftsim.load(BALL)
     data = mujoco.MjData(model)
     with record.Recorder(model, path) as recorder:
@@ -78,12 +81,12 @@ def test_the_print_is_dark_and_the_rest_has_the_colour_of_sand(recorded):
     _, vertices, colours = found["/world/sand/sand/0_0"][-1]
     distance = np.linalg.norm(vertices[:, :2], axis=1)
     assert (colours[distance > 0.2] == [*tile_shapes.SHADES[1], 255]).all()
-    assert (colours[distance < 0.02] == [*tile_shapes.SHADES[0], 255]).all()
+    assert (colours[distance < 0.01] == [*tile_shapes.SHADES[0], 255]).all()
 
 
 def test_tiles_cover_the_ground_around_bodies_without_gaps():
     tiles = Tiles(0.1, 1.0)
-    tiles.note(np.array([[3.0, -2.0], [3.5, -2.0]]), lambda x, y: 0.0 * x, 0.0)
+    tiles.note(np.array([[3.0, -2.0], [3.5, -2.0]]), Pressed(), 0.0)
     corners = tiles.cell * CELLS * np.array(sorted(tiles.kept))
     width = tiles.cell * CELLS
     assert (corners.min(axis=0) <= [0.0, -5.0]).all()

@@ -24,7 +24,7 @@ def _furnish(spec: mujoco.MjSpec) -> None:
     """Give a model a light whose shadows cover it and what is around it, a sky, and room for pictures of 1280 x 720."""
     spec.visual.global_.offwidth, spec.visual.global_.offheight = 1280, 720
     spec.visual.map.shadowclip = 3.0
-    spec.visual.headlight.ambient = [0.45, 0.45, 0.45]
+    spec.visual.headlight.ambient = [0.35, 0.35, 0.35]
     spec.visual.headlight.diffuse = [0.35, 0.35, 0.35]
     spec.worldbody.add_light(
         pos=[0, -1, 2], dir=[0.3, 0.6, -1], type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL, diffuse=[0.5, 0.5, 0.5]

@@ -76,15 +76,22 @@ class Particles:
             setattr(self, field.name, np.ascontiguousarray(getattr(self, field.name)[which]))
 
 
-def earth_pressure(mu: float) -> float:
-    """Ratio K_0 of horizontal to vertical stress in a level bed: Jaky's 1 - sin(phi), or the least that can stand.
+def earth_pressure(mu: float, fall: float = 0.0) -> float:
+    """Ratio K_0 of the stresses along to that across the surface of a bed, or the least that can stand.
 
-    nu / (1 - nu) would violate the yield condition: with both horizontal stresses K times the vertical one, sand stands
-    for K >= (sqrt 3 - mu) / (sqrt 3 + 2 mu), and in plane strain sin(phi) = mu.
+    Jaky's 1 - sin(phi) where it is level and one where it falls by mu, the steepest that stands; a line in between.
+    nu / (1 - nu) would violate the yield condition: with both stresses along the surface K times that across and a
+    shear of `fall` times it, sand stands for 3 (1 - K)^2 + 9 fall^2 <= mu^2 (1 + 2 K)^2; in plane strain sin(phi) = mu.
+
+    Args:
+        mu: Internal friction of the sand [-].
+        fall: Slope of the surface, the tangent of its angle, below mu [-].
     """
     if mu == math.inf:
         return 1.0
-    return max(1.0 - mu, (math.sqrt(3.0) - mu) / (math.sqrt(3.0) + 2.0 * mu) * (1.0 + 1e-9))
+    root = 3.0 * math.sqrt(3.0 * mu**2 - fall**2 * (3.0 - 4.0 * mu**2))
+    least = (3.0 + 9.0 * fall**2 - mu**2) / (3.0 + 2.0 * mu**2 + root)
+    return max(1.0 - mu + fall, least * (1.0 + 1e-9))
 
 
 def level_bed(
@@ -92,19 +99,22 @@ def level_bed(
     size: tuple[float, ...],
     dx: float,
     *,
-    gravity: float = 9.81,
+    gravity: Array | float = 9.81,
     phi: float | None = None,
     ppc: int = 2,
 ) -> Particles:
-    """Return sand at rest in equilibrium, from the origin to `size`.
+    """Return sand at rest in equilibrium, from the origin to `size`; where gravity leans, as on an endless slope.
 
     Args:
         material: The sand.
         size: Extent along each axis [m], the last one up; whole numbers of cells.
         dx: Size of a cell [m].
-        gravity: Acceleration along -z [m/s^2].
+        gravity: Acceleration, (dim,), or the strength of one along -z [m/s^2].
         phi: Packing fraction of a stress-free particle; the critical one if not given.
         ppc: Particles per cell along each axis.
+
+    Raises:
+        MpmError: The bed is not made of whole cells, too large or too loose, or it does not stand.
     """
     phi = material.phi_c if phi is None else phi
     if not material.phi_min <= phi < 1.0:
@@ -121,15 +131,23 @@ def level_bed(
     axes = [(np.arange(ppc * c) + 0.5) * (dx / ppc) for c in cells]
     x = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, dim)
     n = len(x)
-    k0 = earth_pressure(material.mu + (phi - material.phi_c) * material.chi)
+    across, fall = _leaning(gravity, dim)
+    mu = material.mu + (phi - material.phi_c) * material.chi
+    if not np.linalg.norm(fall) < mu:
+        raise MpmError(
+            f"sand of friction {mu:g} does not stand on a slope of {np.linalg.norm(fall):.3g}: it needs more than that"
+        )
+    k0 = earth_pressure(mu, float(np.linalg.norm(fall)))
     theta_d = np.full(n, math.log(phi))
-    above = phi * material.rho_g * gravity * (size[-1] - x[:, -1])
+    above = phi * material.rho_g * across * (size[-1] - x[:, -1])
     for _ in range(3):  # the weight of what is above, compressed by it: the change is of the order of p / K
         theta = theta_d + above * (1.0 + 2.0 * k0) / 3.0 / material.bulk
-        above = _weight_above(x[:, -1], np.exp(theta) * material.rho_g * gravity, dx / ppc)
+        above = _weight_above(x[:, -1], np.exp(theta) * material.rho_g * across, dx / ppc)
     stress = np.zeros((n, 4 if dim == 2 else 6))
     stress[:, 2] = -above
     stress[:, :2] = -k0 * above[:, None]
+    for axis, component in enumerate((3,) if dim == 2 else (4, 3)):  # xz, and yz
+        stress[:, component] = above * fall[axis]
     volume = np.full(n, (dx / ppc) ** dim)
     return Particles(
         x=x,
@@ -142,6 +160,14 @@ def level_bed(
         strain=np.zeros(n),
         number=np.arange(n),
     )
+
+
+def _leaning(gravity: Array | float, dim: int) -> tuple[float, Array]:
+    """Gravity across the surface [m/s^2], and the slope that it makes along each other axis, shape (dim - 1,) [-]."""
+    if np.ndim(gravity) == 0:
+        return float(gravity), np.zeros(dim - 1)
+    *along, down = np.asarray(gravity, float)
+    return -float(down), np.array(along) / -down
 
 
 def _weight_above(z: Array, weight: Array, spacing: float) -> Array:

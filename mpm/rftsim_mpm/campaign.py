@@ -1,4 +1,4 @@
-"""A grid of plates, pushes or wheels as independent jobs: one result file each, written whole or not at all.
+"""A grid of plates, pushes, wheels or slopes as independent jobs: one result file each, written whole or not at all.
 
 A campaign is a folder: `manifest.json` says what belongs to it, `results/KEY.json` holds one job's result with its
 own checksum, KEY being made from the job. What is there and whole is never computed again, so a campaign that was
@@ -21,21 +21,22 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from rftsim_mpm import plate, push, wheel
+from rftsim_mpm import plate, push, slope, wheel
 from rftsim_mpm.errors import MpmError
 from rftsim_mpm.output import replacing
 from rftsim_mpm.plate import Plate
 from rftsim_mpm.push import Push
+from rftsim_mpm.slope import Slope
 from rftsim_mpm.wheel import Wheel
 
-Job = Plate | Push | Wheel
-KINDS: dict[str, type[Job]] = {"plates": Plate, "pushes": Push, "wheels": Wheel}
+Job = Plate | Push | Wheel | Slope
+KINDS: dict[str, type[Job]] = {"plates": Plate, "pushes": Push, "wheels": Wheel, "slopes": Slope}
 """The kinds of jobs by their names in files."""
 
 MOST_JOBS = 100_000
 """Most jobs of one file."""
 DATA = Path(__file__).parent / "data"
-"""Campaigns that are shipped: `plates`, `flat`, `solids`, `deep`, `rates` and `wheels`."""
+"""Campaigns that are shipped: `plates`, `flat`, `solids`, `deep`, `rates`, `wheels` and `slopes`."""
 
 
 class Status(NamedTuple):
@@ -50,7 +51,7 @@ class Status(NamedTuple):
 
 
 def read_jobs(path: Path) -> list[Job]:
-    """Return the jobs of a TOML file: each list under `[[plates]]`, `[[pushes]]` or `[[wheels]]` is an axis of a grid.
+    """Return the jobs of a TOML file: each list in a table that is named as in KINDS, is an axis of a grid.
 
     Settings under `[defaults]` hold for all.
 
@@ -124,7 +125,7 @@ def begin(folder: Path, jobs: list[Job]) -> None:
     known = {key(job): job for job in (manifest(folder) if (folder / "manifest.json").exists() else [])}
     known |= {key(job): job for job in jobs}
     text = {
-        name: {own: dataclasses.asdict(job) for own, job in known.items() if isinstance(job, kind)}
+        name: {own: dataclasses.asdict(job) for own, job in known.items() if type(job) is kind}
         for name, kind in KINDS.items()
     }
     with replacing(folder / "manifest.json") as temporary:
@@ -177,7 +178,7 @@ def _name(job: Job) -> str:
 
 
 def results(folder: Path) -> list[dict[str, Any]]:
-    """Return every finished result: `plate`, `push` or `wheel`, and what the command of that name reports of it."""
+    """Return every finished result: `plate`, `push`, `wheel` or `slope`, and what was measured of it."""
     names = set(status(folder).finished)
     return [json.loads((folder / "results" / f"{name}.json").read_text()) for name in sorted(names)]
 
@@ -191,6 +192,8 @@ def compute(job: Job, beat: Callable[[], None] | None = None) -> dict[str, Any]:
     watch = None if beat is None else lambda sim, share: beat()
     found: plate.PlateForce | push.PushForce | wheel.Rolling
     match job:
+        case Slope():
+            found = slope.measure(job, watch)
         case Plate():
             found = plate.measure(job, watch)
         case Push():

@@ -1,4 +1,4 @@
-"""A body's straight way through a level bed, and the force on it at one place of the way."""
+"""A body's straight way through a bed, and the force on it at one place of the way."""
 
 import dataclasses
 import math
@@ -57,6 +57,10 @@ class Course:
     """Order of XPIC; 0 is FLIP."""
     shift: tuple[float, ...] = (0.0, 0.0)
     """Place of the body on the grid, along each horizontal axis [cells]."""
+    gravity: Array | float = 9.81
+    """Acceleration, (dim,), or the strength of one along -z [m/s^2]."""
+    wall_friction: Array | float = 0.0
+    """Friction of the lower and upper wall across each axis, (dim, 2), or of all; infinite where sand sticks [-]."""
 
     @property
     def level(self) -> float:
@@ -88,12 +92,16 @@ class Course:
         end = start[-1] + (self.approach + self.window) * self.direction[-1]
         top = max(self.level, start[-1] + reach[-1], end + reach[-1]) + reach.max() + 2.0 * dx
         body = Body(self.shape, start, self.speed * self.direction, self.friction, self.rotation)
-        bed = level_bed(self.material, (*(n * dx for n in width), self.level), dx, ppc=self.ppc)
+        filled = (*(n * dx for n in width), self.level)
+        bed = level_bed(self.material, filled, dx, gravity=self.gravity, ppc=self.ppc)
         dt = self.courant * dx / self.material.wave_speed
         if not (self.approach + self.window) / self.speed <= MOST_STEPS * dt:
             raise MpmError(f"the way takes more than {MOST_STEPS:g} time steps of {dt:.3g} s: go faster, or less far")
         box = (*(n * dx for n in width), top)
-        sim = Simulation(self.material, bed, dx, box, bodies=[body], dt=dt, xpic=self.xpic)
+        sim = Simulation(
+            self.material, bed, dx, box, bodies=[body], dt=dt, xpic=self.xpic, gravity=self.gravity,
+            wall_friction=self.wall_friction,
+        )  # fmt: skip
         sim.clear_bodies()
         return sim
 

@@ -6,7 +6,7 @@ along (cos g, 0, -sin g), for b = beta, g = gamma and p = psi.
 
 import dataclasses
 import math
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,7 +94,7 @@ class Plate:
             )
 
     @property
-    def quick(self) -> "Plate":
+    def quick(self) -> Self:
         """The same with six cells, and less sand around: a look, not a measurement."""
         return dataclasses.replace(self, cells=6.0, bed=0.7 * self.bed)
 
@@ -236,7 +236,11 @@ def measure(plate: Plate, watch: Watch | None = None) -> PlateForce:
         plate: The plate, its motion and its sand.
         watch: Called after each step with the simulation and the share of the way that is done.
     """
-    way = course(plate)
+    return reading(plate, course(plate), watch)
+
+
+def reading(plate: Plate, way: Course, watch: Watch | None = None) -> PlateForce:
+    """Return the force on a plate on a way of its own, read as `measure` reads it."""
     found = way.run(watch)
     return PlateForce(
         force=found.force,

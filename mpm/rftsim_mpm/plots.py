@@ -108,13 +108,17 @@ def plot_history(history: History, title: str, path: Path, frame: Frame | None =
 
 
 def plot_campaign(found: list[dict[str, Any]], path: Path) -> None:
-    """Draw force against the direction of motion, by component: of plates per area and depth, of pushes as it is."""
-    plates = [result for result in found if "plate" in result] or None
+    """Draw force against the direction of motion, by component: of plates per area and depth, of pushes as it is.
+
+    A plate's angles on a slope are those from its surface.
+    """
+    plates = [result for result in found if "plate" in result or "slope" in result] or None
     lines: dict[str, list[tuple[float, list[float]]]] = {}
     for result in plates or found:
         if plates:
-            job, value = result["plate"], [1e-6 * a for a in result["alpha_N_m3"]]
-            label, angle = f"β {job['beta']:g}°, ψ {job['psi']:g}°, μ {job['mu_int']:g}", job["gamma"]
+            job, value = result["plate" if "plate" in result else "slope"], [1e-6 * a for a in result["alpha_N_m3"]]
+            place = f"slope {job['slope']:g}°" if "slope" in job else f"ψ {job['psi']:g}°"
+            label, angle = f"β {job['beta']:g}°, {place}, μ {job['mu_int']:g}", job["gamma"]
         else:
             job, value = result["push"], result["force"]
             label, angle = job["shape"], job["theta"]

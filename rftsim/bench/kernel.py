@@ -13,6 +13,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from rftsim.law.evaluate import handle
 from rftsim.law.laws import get_law
 from rftsim.law.layout import BLOCK, COLUMNS, pack_bed, pack_surface
 from rftsim.law.leading import leads
@@ -91,13 +92,14 @@ def measure(sizes: tuple[int, ...], oracle: ModuleType | None, report: Callable[
     from rftsim.bench import loops  # which numba compiles
 
     bed = pack_bed(SAND, get_law(LAW), FreeSurface(), (0.0, 1.0, 0.0))
+    sand = handle(bed)
     works: list[Callable[[int], Any]] = []
     bodies = []
     for size in sizes:
         surface = _ball(size)
         body = pack_surface(surface)
         bodies.append((body.nbytes, _leading(surface)))
-        works.append(functools.partial(loops.evaluate, bed, body, *_motion(surface), np.empty(6)))
+        works.append(functools.partial(loops.evaluate, sand, body, *_motion(surface), np.empty(6)))
         if oracle is not None and size <= LITERAL:
             works.append(functools.partial(_literal, oracle, surface))
     seconds = iter(_least(works, report))
@@ -114,9 +116,10 @@ def arithmetic() -> Arithmetic:
     from rftsim.bench import loops  # which numba compiles
 
     bed = pack_bed(SAND, get_law(LAW), FreeSurface(), (0.0, 1.0, 0.0))
+    sand = handle(bed)
     surface = _ball(BLOCK)
     body = pack_surface(surface)
-    loops.law_loop(bed, body, *_motion(surface))
+    loops.law_loop(sand, body, *_motion(surface))
     operations = _count(next(iter(loops.law_loop.inspect_asm().values())))
     numbers = np.linspace(0.0, 0.5, 512)
     (seconds,) = _least([functools.partial(loops.polynomials, numbers, np.empty(numbers.size))], lambda _: None)

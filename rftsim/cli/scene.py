@@ -41,6 +41,8 @@ class Scene:
     """The sand's surface: a height [m]; slope=DEGREES[,heading=DEGREES]; dunes[,amplitude=M,wavelength=M,seed=N];
     FILE.png,size=XxY,high=M[,low=M]; a .npy, .npz or .csv of heights with spacing=M; or the name of a height field geom
     of the model. By default that of the floor, whose place it takes."""
+    ruts: bool = False
+    """Let the sand remember: bodies leave ruts, prints and heaps in it, which they feel when they come back."""
     keyframe: str | None = None
     """Name or number of the keyframe in which a model file starts; by default the first."""
     keep_floor: bool = False
@@ -72,6 +74,7 @@ class Scene:
             settings=read_settings(self.set),
             start=Start(self.keyframe, settle),
             terrain=self.terrain,
+            ruts=self.ruts,
             geoms=self.geoms,
             meshes=self.meshes,
             keep_floor=self.keep_floor,

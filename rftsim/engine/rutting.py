@@ -20,7 +20,7 @@ from rftsim.solver.motion import size_of
 
 PART: Final = 0.25
 """How far a body may move before its marks are made [cells]."""
-SLIDING: Final = 5e-3
+SLIDING: Final = 0.01
 """Time between two goes at sand that slides [s]."""
 MARGIN: Final = 4
 """Cells about what bodies cover that are looked at."""
@@ -58,22 +58,27 @@ def _is_due(model, m, t, address, marks, head, h):
 
 
 @exact
-def _cover(model, m, t, address, field, marks, out):
-    """Fill out with the rows and columns that bodies near the sand cover, first and behind the last, (4,); or none."""
+def _covers(model, m, t, address, k, field, marks, out):
+    """Fill out with the rows and columns that the k-th body covers, first and behind the last, (4,); if it is near."""
     box, reach = doubles(stack_doubles(6), 6), BLOCK_SIDE * marks.spacing
-    out[0], out[1], out[2], out[3] = 1e15, 1e15, -1e15, -1e15
-    for k in range(instance.head(address).nbody):
-        _box(t, instance.body(address, k), instance.surface(model, m, address, k), box)
-        x, y = 0.5 * (box[0] + box[3]), 0.5 * (box[1] + box[4])
-        height, along, across = fields.surface_over(field, x, y)
-        rise = abs(along) * 0.5 * (box[3] - box[0]) + abs(across) * 0.5 * (box[4] - box[1])
-        if not box[2] <= height + rise + reach:
-            continue
-        out[0] = min(out[0], ruts.cell(box[1], marks.spacing))
-        out[1] = min(out[1], ruts.cell(box[0], marks.spacing))
-        out[2] = max(out[2], ruts.cell(box[4], marks.spacing) + 1)
-        out[3] = max(out[3], ruts.cell(box[3], marks.spacing) + 1)
-    return out[2] > out[0]
+    _box(t, instance.body(address, k), instance.surface(model, m, address, k), box)
+    x, y = 0.5 * (box[0] + box[3]), 0.5 * (box[1] + box[4])
+    height, along, across = fields.surface_over(field, x, y)
+    rise = abs(along) * 0.5 * (box[3] - box[0]) + abs(across) * 0.5 * (box[4] - box[1])
+    out[0], out[1] = ruts.cell(box[1], marks.spacing), ruts.cell(box[0], marks.spacing)
+    out[2], out[3] = ruts.cell(box[4], marks.spacing) + 1, ruts.cell(box[3], marks.spacing) + 1
+    return box[2] <= height + rise + reach
+
+
+@exact
+def _join(box, other):
+    """Widen a box of cells, first row and column and behind the last, (4,), to hold another, where that holds any."""
+    if other[2] <= other[0]:
+        return
+    is_empty = box[2] <= box[0]
+    for k in range(2):
+        box[k] = other[k] if is_empty else min(box[k], other[k])
+        box[2 + k] = other[2 + k] if is_empty else max(box[2 + k], other[2 + k])
 
 
 @exact
@@ -111,18 +116,16 @@ def _follow(head, marks, cover):
 
 
 @exact
-def _average(marks, row, column, rows, columns):
-    """Fill the means of the blocks that a rectangle of cells touches, within the window."""
-    wide = marks.columns // BLOCK_SIDE
-    high = marks.rows // BLOCK_SIDE
-    values, blocks = doubles(marks.cells, marks.rows * marks.columns), doubles(marks.blocks, wide * high)
-    for i in range(row // BLOCK_SIDE, (row + rows + BLOCK_SIDE - 1) // BLOCK_SIDE):
-        for j in range(column // BLOCK_SIDE, (column + columns + BLOCK_SIDE - 1) // BLOCK_SIDE):
-            total = 0.0
-            for a in range(BLOCK_SIDE):
-                for b in range(BLOCK_SIDE):
-                    total += values[ruts.place_of(marks, BLOCK_SIDE * i + a, BLOCK_SIDE * j + b)]
-            blocks[(i & (high - 1)) * wide + (j & (wide - 1))] = total / (BLOCK_SIDE * BLOCK_SIDE)
+def _average(marks):
+    """Fill the means of all blocks."""
+    count = marks.rows * marks.columns
+    values, blocks = doubles(marks.cells, count), doubles(marks.blocks, count // BLOCK_SIDE**2)
+    for k in range(blocks.size):
+        blocks[k] = 0.0
+    for row in range(marks.row, marks.row + marks.rows):
+        for column in range(marks.column, marks.column + marks.columns):
+            value = values[ruts.place_of(marks, row, column)]
+            blocks[ruts.block_place(marks, row // BLOCK_SIDE, column // BLOCK_SIDE)] += value / BLOCK_SIDE**2
 
 
 @exact
@@ -141,46 +144,56 @@ def _fill_heights(p, field, marks):
 
 
 @exact
-def _clip(head, marks, cover, is_covered):
-    """The rectangle to be worked on: what bodies cover and what slides, and a margin, within the window; (4,)."""
-    low, high = (1e15, 1e15), (-1e15, -1e15)
-    if is_covered:
-        low, high = (cover[0], cover[1]), (cover[2], cover[3])
-    on = head.unsettled
-    if on[2] > on[0]:
-        low = min(low[0], on[0]), min(low[1], on[1])
-        high = max(high[0], on[2]), max(high[1], on[3])
-    row, column = max(low[0] - MARGIN, float(marks.row)), max(low[1] - MARGIN, float(marks.column))
-    end = (
-        min(high[0] + MARGIN, float(marks.row + marks.rows)),
-        min(high[1] + MARGIN, float(marks.column + marks.columns)),
-    )
-    return int(row), int(column), int(end[0]), int(end[1])
+def _lay_out(p, marks, box):
+    """Lay out a patch of a box of cells and a margin, as far as it lies in the window; bytes, or zero for no cells."""
+    table = patch.head(p)
+    row, column = max(box[0] - MARGIN, float(marks.row)), max(box[1] - MARGIN, float(marks.column))
+    end = min(box[2] + MARGIN, float(marks.row + marks.rows)), min(box[3] + MARGIN, float(marks.column + marks.columns))
+    table.row, table.column = int(row), int(column)
+    table.rows, table.columns = int(end[0]) - table.row, int(end[1]) - table.column
+    return patch.lay_out(p) if table.rows > 2 and table.columns > 2 else 0
 
 
 @exact
-def _work(model, m, t, address, field, head, marks, rectangle, repose):
-    """Mark and slide in a rectangle of cells, see `_clip`."""
+def _work(model, m, t, address, field, head, marks, box, repose):
+    """Mark and slide in a box of cells, first row and column and behind the last, (4,)."""
     p = stack_doubles(_TABLE)
-    table = patch.head(p)
-    table.row, table.column = rectangle[0], rectangle[1]
-    table.rows, table.columns = rectangle[2] - rectangle[0], rectangle[3] - rectangle[1]
-    memory = take(patch.lay_out(p))
+    size = _lay_out(p, marks, box)
+    memory = take(size) if size > 0 else 0
     if memory == 0:
         return
     patch.place(p, memory)
     top = _fill_heights(p, field, marks)
     for k in range(instance.head(address).nbody):
         sweeps.press(p, t, marks, top, instance.body(address, k), k, instance.surface(model, m, address, k))
-    head.moved += sweeps.lower(model, m, t, address, p, marks)
-    slid = slides.settle(p, marks, repose)
-    on = head.unsettled
-    on[0], on[1], on[2], on[3] = 0.0, 0.0, 0.0, 0.0
-    if slid[2] >= 0:
-        on[0], on[1] = table.row + slid[0], table.column + slid[1]
-        on[2], on[3] = table.row + slid[2] + 1, table.column + slid[3] + 1
-    _average(marks, table.row, table.column, table.rows, table.columns)
+    head.moved += sweeps.lower(model, m, t, address, p, marks, repose)
+    slid, on = slides.settle(p, marks, repose), doubles(stack_doubles(4), 4)
+    on[0], on[1] = patch.head(p).row + slid[0], patch.head(p).column + slid[1]
+    on[2], on[3] = patch.head(p).row + slid[2], patch.head(p).column + slid[3]
+    _join(head.unsettled, on)
     release(memory)
+
+
+@exact
+def _look(model, m, t, address, sand, at):
+    """Mark what was swept since the ruts were looked at, and let sand slide."""
+    head, bed = ruts.ruts_at(at), bed_at(fields.sand_at(sand).bed)
+    marks, field = ruts.marks_of(fields.sand_at(sand).bed, at), fields.field_of(sand, False)
+    box, cover, sliding = doubles(stack_doubles(4), 4), doubles(stack_doubles(4), 4), doubles(stack_doubles(4), 4)
+    for k in range(4):
+        sliding[k], head.unsettled[k], cover[k] = head.unsettled[k], 0.0, 0.0
+    head.travel = head.clock = 0.0
+    for k in range(instance.head(address).nbody):
+        if _covers(model, m, t, address, k, field, marks, box):
+            _join(cover, box)
+    if cover[2] > cover[0] and _follow(head, marks, cover):
+        marks = ruts.marks_of(fields.sand_at(sand).bed, at)
+        _average(marks)
+    for k in range(instance.head(address).nbody):
+        if _covers(model, m, t, address, k, field, marks, box):
+            _work(model, m, t, address, field, head, marks, box, bed.mu_int)
+    if sliding[2] > sliding[0]:
+        _work(model, m, t, address, field, head, marks, sliding, bed.mu_int)
 
 
 @exact
@@ -191,17 +204,7 @@ def remember(model, data, m, d, number):
         return
     sand = stack_doubles(_SAND)
     instance.fill_sand(model, m, address, sand)
-    at = fields.sand_at(sand).ruts
-    head, bed = ruts.ruts_at(at), bed_at(fields.sand_at(sand).bed)
-    marks, t = ruts.marks_of(fields.sand_at(sand).bed, at), bodies.tree(model, data, m, d)
-    if not _is_due(model, m, t, address, marks, head, doubles(m + model.opt_timestep, 1)[0]):
-        return
-    head.travel = head.clock = 0.0
-    field, cover = fields.field_of(sand, False), doubles(stack_doubles(4), 4)
-    is_covered = _cover(model, m, t, address, field, marks, cover)
-    if is_covered and _follow(head, marks, cover):
-        marks = ruts.marks_of(fields.sand_at(sand).bed, at)
-        _average(marks, marks.row, marks.column, marks.rows, marks.columns)
-    rectangle = _clip(head, marks, cover, is_covered)
-    if rectangle[2] > rectangle[0] and rectangle[3] > rectangle[1]:
-        _work(model, m, t, address, field, head, marks, rectangle, bed.mu_int)
+    at, t = fields.sand_at(sand).ruts, bodies.tree(model, data, m, d)
+    marks, h = ruts.marks_of(fields.sand_at(sand).bed, at), doubles(m + model.opt_timestep, 1)[0]
+    if _is_due(model, m, t, address, marks, ruts.ruts_at(at), h):
+        _look(model, m, t, address, sand, at)

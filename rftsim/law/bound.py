@@ -7,7 +7,6 @@ import numpy as np
 from rftsim.law import ruts
 from rftsim.law.field import level_at, normal_of, surface_over
 from rftsim.law.frame import over
-from rftsim.law.layout import BLOCK_SIDE
 from rftsim.law.vectors import cross, dot, larger, smaller, to_body, to_world
 from rftsim.machine.compiling import exact, inline, loop
 from rftsim.machine.memory import doubles, peek
@@ -42,8 +41,7 @@ def over_relief(frame, field, lowest, highest, reach):
     height, along, across = surface_over(field, a, b)
     normal = normal_of(field, along, across)
     above = height + _most_above(field, (a, b), (wide, long), (along, across, height))
-    side = BLOCK_SIDE * field.marks.spacing
-    above += ruts.highest_level(field.marks, a, b, wide + side, long + side)
+    above += ruts.highest_level(field.marks, a, b, wide, long)
     up = to_body(r, normal[0], normal[1], normal[2])
     rise = to_body(r, -along, -across, 1.0)
     plane = cross(frame.up, frame.forward)

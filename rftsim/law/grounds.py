@@ -23,6 +23,8 @@ class Ground(NamedTuple):
     Undisturbed depth [m], up, shape (3,), and the gradient of the height over the surface, shape (3,), come together.
     """
 
+    is_relief: bool
+    """Whether its depths are not those below a frame's plane, which is nowhere below it."""
     columns: int
     """Columns of a chosen triangle."""
     field: Any
@@ -60,7 +62,7 @@ def plane(response: Response) -> Ground:
     def local(frame, up):
         return frame
 
-    return Ground(COLUMNS, field, look, settle, found, local)
+    return Ground(False, COLUMNS, field, look, settle, found, local)
 
 
 def uneven(response: Response) -> Ground:
@@ -82,7 +84,7 @@ def uneven(response: Response) -> Ground:
         up = peek(chosen, at + stride), peek(chosen, at + 2 * stride), peek(chosen, at + 3 * stride)
         return peek(chosen, at), up, up
 
-    return Ground(ALL_COLUMNS, field, look, relief.settle, found, relief.local)
+    return Ground(True, ALL_COLUMNS, field, look, relief.settle, found, relief.local)
 
 
 GROUNDS: Final = (plane, uneven)

@@ -10,7 +10,7 @@ from numba import carray, types
 from rftsim.law import ruts
 from rftsim.law.field import level_at, next_three, normal_of, spline, start_of, surface_over
 from rftsim.law.frame import over
-from rftsim.law.layout import BLOCK_SIDE, COLUMN, COLUMNS
+from rftsim.law.layout import COLUMN, COLUMNS
 from rftsim.law.vectors import cross, smaller, to_body, to_world
 from rftsim.machine.compiling import inline, inline_loop
 from rftsim.machine.memory import doubles, on_stack, peek, poke
@@ -36,8 +36,8 @@ def _rutted(field, n, place, above):
     """
     (x, y, z), (height, along, across), cell = place, above, field.marks.spacing
     left = ruts.height(field.marks, x + ruts.BEFORE * cell * n[0], y + ruts.BEFORE * cell * n[1])
-    share, side = ruts.reaches(field.marks, z - height - left), BLOCK_SIDE * cell
-    level, more_along, more_across = ruts.level(field.marks, x + side * n[0], y + side * n[1])
+    share = ruts.reaches(field.marks, z - height - left)
+    level, more_along, more_across = ruts.level(field.marks, x, y)
     return share, height + level, along + more_along, across + more_across
 
 

@@ -2,9 +2,9 @@
 
 What carries a face is the weight of the sand beside it, and not what lies just above it: in a continuum a foot that is
 pressed into its own print again bears what it did the first time, though the print is half as deep as it was pressed.
-So the depth counts from the mean level about as far around as the face's body is wide, a surface of quadratic B-splines
-through blocks of cells; before the face, where its normal points. And the face bears nothing where it does not reach
-what is left of the sand, over a gap of half a cell.
+So the depth counts from the mean level about the face, over twice as far as what presses is wide: a surface of
+quadratic B-splines through the means of blocks of cells. And the face bears nothing where it does not reach what is
+left of the sand before it, over a gap of half a cell.
 """
 
 from collections import namedtuple
@@ -87,6 +87,13 @@ def height(marks, x, y):
 
 
 @inline
+def block_place(marks, row, column):
+    """Where the mean of a block that lies in the window is kept."""
+    rows, columns = marks.rows // BLOCK_SIDE, marks.columns // BLOCK_SIDE
+    return (row & (rows - 1)) * columns + (column & (columns - 1))
+
+
+@inline
 def _block(marks, row, column):
     """Mean height of a block over the free surface [m]; none out of the window."""
     rows, columns = marks.rows // BLOCK_SIDE, marks.columns // BLOCK_SIDE
@@ -94,7 +101,7 @@ def _block(marks, row, column):
     if (r < 0) | (c < 0) | (r >= rows) | (c >= columns):
         return 0.0
     values = doubles(marks.blocks, rows * columns)
-    return peek(values, (row & (rows - 1)) * columns + (column & (columns - 1)))
+    return peek(values, block_place(marks, row, column))
 
 
 @inline

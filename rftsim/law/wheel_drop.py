@@ -7,6 +7,7 @@ from numba import carray, types
 
 from rftsim.law import body as bodies
 from rftsim.law.frame import behind, point_velocity
+from rftsim.law.free_surface import plane_depth
 from rftsim.law.grounds import Ground
 from rftsim.law.laws import Response
 from rftsim.law.layout import BLOCK, NO_RIM
@@ -30,7 +31,7 @@ def dropped(response: Response, ground: Ground) -> Any:
     delta h = r (r omega^2 / g) over the rear half of the contact arc: the arc that the submerged leading triangles of
     the rim span at the wheel's centre, halved by angle.
     """
-    normal_speed = response.normal_speed
+    normal_speed, is_relief = response.normal_speed, ground.is_relief
 
     @inline_loop
     def rim_angles(body, start, count, frame, field, down, out):
@@ -43,8 +44,13 @@ def dropped(response: Response, ground: Ground) -> Any:
             angle = on_rim - down
             angle -= 2.0 * np.pi if angle > np.pi else 0.0
             angle += 2.0 * np.pi if angle < -np.pi else 0.0
-            deep = ground.look(x, y, z, bodies.normal(body, start + i), frame, field)[0]
-            out[i] = angle if (deep > 0.0) & leads & (on_rim < NO_RIM) else NO_RIM
+            out[i] = angle if (plane_depth(x, y, z, frame) > 0.0) & leads & (on_rim < NO_RIM) else NO_RIM
+        if is_relief:
+            for i in range(count):
+                if out[i] < NO_RIM:
+                    x, y, z = bodies.centre(body, start + i)
+                    deep = ground.look(x, y, z, bodies.normal(body, start + i), frame, field)[0]
+                    out[i] = out[i] if deep > 0.0 else NO_RIM
 
     @inline
     def arc(body, frame, field, down):

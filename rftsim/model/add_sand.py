@@ -120,12 +120,12 @@ def add_sand(
         reduction: Model only what the scene needs: the fewest elements whose wrench is that of all triangles within
             this share (see `rftsim.reduction`), in the poses and motions that the joints allow, and none of bodies that
             cannot reach the sand unless they are named in `bodies`. It holds for this sand, law and tree, and for each
-            slope that a terrain has. Zero models
-            every triangle of every body, also for a model that is attached to another, or whose sand is tilted later.
+            slope that a terrain has. Zero models every triangle of every body, also for a model that is attached to
+            another, or whose sand is tilted later.
         wheels: Driven wheels, behind which the dynamic laws let the free surface drop: names, whose axis is then that
             of their hinge and whose radius that of their surface; or `Wheel` by name.
         sensors: Add the sensors.
-        draw: Draw the free surface as a translucent plane.
+        draw: Draw the free surface, as a plane or as height fields that collide with nothing.
         force: `implicit`: the sand's force at the end of each step, which holds at rest and at long steps; `explicit`:
             at the velocity of the moment.
         tolerance: Error of a body's velocity, relative, to which the implicit force is solved for in each step, 1e-6 to
@@ -149,7 +149,7 @@ def add_sand(
     check_bed(spec, name)
     draft = make_draft(spec)  # what is checked; the spec itself stays as it is until all is well
     _check_model(draft.model)
-    site = find_site(spec, draft, terrain)
+    site = find_site(draft, terrain)
     numbers = layout.pack_bed(bed_sand, bed_law, site.terrain, plane, tolerance=tolerance, iterations=iterations)
     choice = Choice(
         bodies=None if bodies is None else frozenset(_names(bodies)),
@@ -157,17 +157,12 @@ def add_sand(
         plane=plane_of(numbers, bed_law, site.terrain),
         terrain=site.terrain if reduction and bodies is None else None,
     )
-    felt = felt_bodies(draft.model, draft.data, choice)
-    check_planar(draft.model, draft.data, felt.surfaces, bed_law, choice.plane)
-    wheeled = rolling(draft.model, felt.surfaces, wheels if isinstance(wheels, Mapping) else _names(wheels))
-    felt.surfaces.update(wheeled if bed_law.dynamic else {})
+    felt = _felt(draft, choice, bed_law, wheels if isinstance(wheels, Mapping) else _names(wheels))
     marks = marks_for(draft.data, draft.model, felt.surfaces) if ruts is True else ruts or None
     whole = dict(felt.surfaces)
     economies = economise(draft.model, felt, numbers, reduction, slopes_of(site.terrain, choice.plane))
     floors = find_floors(draft.model, draft.data, site.terrain, max(s.size for s in felt.surfaces.values()))
-    check_sensors(spec, felt.surfaces if sensors else ())
-    if draw:
-        check_drawing(spec, name)
+    _check_names(spec, name, felt.surfaces if sensors else (), draw)
     if marks is not None:
         layout.remember(numbers, marks)
     packed = _packed(draft.model, felt, marks, whole)
@@ -178,7 +173,7 @@ def add_sand(
     write_bed(spec, carrier, numbers, packed)
     write_sensors(spec, carrier, felt.surfaces if sensors else ())
     if draw:
-        write_drawing(spec, name, site.terrain, draft)
+        write_drawing(spec, name, site.terrain, draft, marks)
     choices = [*felt.choices, *_integrate(spec, force)]
     if not keep_floor:
         choices = say_ground(site.field, floors, remove_floors(spec, floors)) + choices
@@ -186,6 +181,15 @@ def add_sand(
     return Bed(
         name, bed_sand, bed_law, site.terrain, felt.surfaces, felt.reasons, tuple(choices), tuple(notes), economies
     )
+
+
+def _felt(draft: Draft, choice: Choice, law: Law, wheels: "Mapping[str, Wheel] | Iterable[str]") -> Felt:
+    """The bodies that feel the sand, some of them as wheels; those that can leave the plane of a law are refused."""
+    felt = felt_bodies(draft.model, draft.data, choice)
+    check_planar(draft.model, draft.data, felt.surfaces, law, choice.plane)
+    wheeled = rolling(draft.model, felt.surfaces, wheels)
+    felt.surfaces.update(wheeled if law.dynamic else {})
+    return felt
 
 
 def _integrate(spec: mujoco.MjSpec, force: str) -> list[str]:
@@ -291,6 +295,13 @@ def _check_solution(tolerance: float, iterations: int) -> None:
             "tolerance is that of the implicit force, 1e-06 to 0.1, not 0; reduction=0 keeps every triangle"
         )
     check_solution(tolerance, iterations)
+
+
+def _check_names(spec: mujoco.MjSpec, name: str, read: Iterable[str], draw: bool) -> None:
+    """Refuse names that the sensors of bodies that are read, or the drawing of a bed, would have beside others."""
+    check_sensors(spec, read)
+    if draw:
+        check_drawing(spec, name)
 
 
 def _check_model(model: mujoco.MjModel) -> None:

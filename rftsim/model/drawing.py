@@ -12,9 +12,10 @@ from rftsim.model.bounds import bounds
 from rftsim.model.draft import Draft
 from rftsim.model.relief import Field, Fineness, Level, make_levels, period, sample_fields
 from rftsim.sand.free_surface import FreeSurface
+from rftsim.sand.ruts import Ruts
 from rftsim.sand.terrain import Terrain
 
-SAND_RGB: Final = (0.70, 0.61, 0.47)
+SAND_RGB: Final = (0.70, 0.60, 0.45)
 """Colour of the drawn sand, in the mean."""
 GRAIN_RGB: Final = (0.50, 0.42, 0.30)
 """Colour of the grains on it, where MuJoCo marks some."""
@@ -22,7 +23,7 @@ PERIOD: Final = 0.2
 """Side of the texture of grains, which repeats, over the extent of what can move."""
 PIXELS: Final = 256
 """Side of the texture [pixels]."""
-SHINE: Final = 0.2
+SHINE: Final = 0.1
 """Light that the drawn sand gives off itself."""
 THICK: Final = 0.3
 """Thickness of fields below their lowest vertex, over the extent of what can move."""
@@ -44,7 +45,7 @@ def check_drawing(spec: mujoco.MjSpec, name: str) -> None:
 
 
 def write_drawing(
-    spec: mujoco.MjSpec, name: str, terrain: FreeSurface | Terrain, draft: Draft, marks: Fineness | None = None
+    spec: mujoco.MjSpec, name: str, terrain: FreeSurface | Terrain, draft: Draft, ruts: Ruts | None = None
 ) -> None:
     """Draw the surface of a bed of sand, which collides with nothing and hides what is buried.
 
@@ -56,8 +57,9 @@ def write_drawing(
         name: Name of the bed.
         terrain: Its surface, undisturbed.
         draft: The model before it had sand.
-        marks: Fineness of the marks that bodies leave in the sand; None where they leave none.
+        ruts: The marks that bodies leave in the sand; None where they leave none.
     """
+    marks = None if ruts is None else Fineness(ruts.spacing, max(ruts.cells) * ruts.spacing)
     centre, extent = bounds(draft.model, draft.data)
     grain = period(terrain, marks, PERIOD * extent)
     _write_grains(spec, _drawing(name), grain)

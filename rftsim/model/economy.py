@@ -45,11 +45,11 @@ def _evaluated(bed: Array, slopes: Slopes) -> Array:
 
     That of a terrain is level: the bodies are turned to its slopes.
     """
-    same = bed[: layout.numbers_in(layout.BED)].copy()
+    same = bed[: layout.BED_NUMBERS].copy()
     record = layout.record(same, layout.BED)
     record.tolerance, record.iterations = layout.TOLERANCE, layout.ITERATIONS
     if slopes is not LEVEL:
-        record.up, record.offset = (0.0, 0.0, 1.0), 0.0
+        record.up, record.offset, record.relief = (0.0, 0.0, 1.0), 0.0, 0.0
     return same
 
 

@@ -7,8 +7,12 @@ import mujoco
 import numpy as np
 
 from rftsim.sand.ruts import Ruts, ruts_for
-from rftsim.surface.triangles import Surface
+from rftsim.surface.triangles import Array, Surface
 
+SOLE: Final = 0.05
+"""Part of a body's size, from below, whose outline is what presses."""
+NARROWEST: Final = 1.0 / 3.0
+"""The narrowest that presses, over the second of a body's three extents: a blade's edge tells nothing of its reach."""
 PRESSING: Final = 0.25
 """Bodies press whose lowest point lies no higher above the lowest of all than this part of the largest body's size."""
 
@@ -28,7 +32,15 @@ def marks_for(data: mujoco.MjData, model: mujoco.MjModel, surfaces: Mapping[str,
     lowest = {name: float(points[:, 2].min()) for name, points in corners.items()}
     reach = PRESSING * max(surface.size for surface in surfaces.values())
     pressing = [name for name, height in lowest.items() if height <= min(lowest.values()) + reach]
-    width = min(float(np.sort(np.ptp(surfaces[name].corners, axis=0))[1]) for name in pressing)
+    width = min(_width(corners[name]) for name in pressing)
     everything = np.concatenate(list(corners.values()))
     x, y = np.ptp(everything[:, :2], axis=0).tolist()
     return ruts_for(width, (x, y))
+
+
+def _width(points: Array) -> float:
+    """The narrower side of what lies lowest of a body's corners, along x and y [m]; points in the world, (n, 3)."""
+    size = float(np.ptp(points, axis=0).max())
+    sole = points[points[:, 2] <= points[:, 2].min() + SOLE * size]
+    second = float(np.sort(np.ptp(points, axis=0))[1])
+    return max(float(np.ptp(sole[:, :2], axis=0).min()), NARROWEST * second)

@@ -1,8 +1,8 @@
 """The heights of a free surface as people see it: square fields around a place, each finer and smaller than the next.
 
 A field's vertices lie on the surface. Where a finer one lies over it, it is lowered until it is hidden; the rim of a
-finer one lies on the edges of the coarser one's triangles, so that between the two there is no gap. Fields lie on
-lattices that are fixed to the world, so that what they show stays in place when they follow a robot.
+finer one lies just below the edges of the coarser one's triangles, so that between the two there is no gap. Fields lie
+on lattices that are fixed to the world, so that what they show stays in place when they follow a robot.
 """
 
 import math
@@ -29,6 +29,10 @@ REACH: Final = 60.0
 """Distance that the coarsest field covers at least, over the extent of what can move."""
 BELOW: Final = 0.02
 """Depth of a field below a finer one, over its cell, at least."""
+SKIRT: Final = 0.2
+"""Depth of the rim of a field below the coarser one, over its own cell: walls below it cast shadows on nothing."""
+SMOOTH: Final = 1.5
+"""Cells to a spacing of a terrain's values at least, which triangles show smoothly."""
 LOWERED: Final = 0.25
 """Step by which it is lowered where that is not enough, over the same: it seldom changes where marks deepen."""
 Heights = Callable[[Array, Array], Any]
@@ -79,7 +83,7 @@ def make_levels(terrain: FreeSurface | Terrain, marks: Fineness | None, grain: f
     relief, whole = math.inf, 2.0 * REACH * extent
     if isinstance(terrain, Terrain):
         shape = np.array(terrain.heights.shape[::-1]) * terrain.spacing
-        spacing = min(terrain.spacing)
+        spacing = min(terrain.spacing) / SMOOTH
         own = Fineness(spacing, ENDLESS * spacing if terrain.repeat else float(shape.max()))
         relief, marks = _power(own.spacing, grain, math.floor), marks or own
     assert marks is not None, "a plane without marks needs no fields"
@@ -153,12 +157,15 @@ def _join(inner: Field, outer: Field, fine: Level, coarse: Level) -> None:
     under = outer.heights[rows, columns]
     refine = _refinement(cells, ratio)
     covered = refine @ under @ refine.T
-    for rim in (np.s_[[0, -1], :], np.s_[:, [0, -1]]):
+    rims = np.s_[[0, -1], :], np.s_[:, [0, -1]]
+    for rim in rims:
         inner.heights[rim] = covered[rim]
     over = _around(covered - inner.heights).reshape(cells, ratio, cells, ratio).max(axis=(1, 3))
     twist = np.abs(under[1:, 1:] + under[:-1, :-1] - under[1:, :-1] - under[:-1, 1:])  # by the diagonal that is drawn
     below, step = BELOW * coarse.cell, LOWERED * coarse.cell
     under[1:-1, 1:-1] -= _around(below + step * np.ceil(np.maximum(over + 0.25 * twist - 0.5 * below, 0.0) / step))
+    for rim in rims:
+        inner.heights[rim] = covered[rim] - SKIRT * fine.cell
 
 
 def _refinement(cells: int, ratio: int) -> Array:

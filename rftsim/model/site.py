@@ -3,16 +3,15 @@
 from typing import NamedTuple
 
 import mujoco
-import numpy as np
 
-from rftsim.engine import block
 from rftsim.errors import SandError, SceneError
 from rftsim.law import layout
 from rftsim.model.draft import Draft
 from rftsim.model.floors import find_support
 from rftsim.model.height_field import field_terrain
+from rftsim.model.readout import Instance, instances
 from rftsim.sand.free_surface import FreeSurface
-from rftsim.sand.terrain import Terrain
+from rftsim.sand.terrain import PAD, Terrain
 from rftsim.sand.terrains import make_terrain
 
 _HFIELD = int(mujoco.mjtGeom.mjGEOM_HFIELD)
@@ -27,12 +26,11 @@ class Site(NamedTuple):
     """Name in the draft of the height field whose relief it has, if it has one's."""
 
 
-def find_site(spec: mujoco.MjSpec, draft: Draft, terrain: "FreeSurface | Terrain | float | str | None") -> Site:
+def find_site(draft: Draft, terrain: "FreeSurface | Terrain | float | str | None") -> Site:
     """The free surface that was asked for, or that of another bed of the model, or that of its floor, or z = 0.
 
     Args:
-        spec: The model that is to have sand.
-        draft: Its draft.
+        draft: The draft of the model that is to have sand.
         terrain: A surface, or what names one: a height field geom of the model, or see `make_terrain`; None for none.
 
     Raises:
@@ -43,15 +41,23 @@ def find_site(spec: mujoco.MjSpec, draft: Draft, terrain: "FreeSurface | Terrain
         return _named(draft, terrain)
     if terrain is not None:
         return Site(make_terrain(terrain), None)
-    for numeric in spec.numerics:
-        if block.SAND_MARKER in numeric.name:
-            other = layout.record(np.array(numeric.data), layout.BED)
-            return Site(FreeSurface(float(other.offset / other.up[2]), tuple(other.up.tolist())), None)
+    for bed in instances(draft.model):
+        return Site(_surface(bed), None)
     support = find_support(draft.model, draft.data)
     if support is None:
         return Site(FreeSurface(), None)
     is_field = draft.model.geom_type[support.geom] == _HFIELD
     return Site(support.terrain, draft.model.geom(support.geom).name if is_field else None)
+
+
+def _surface(bed: Instance) -> "FreeSurface | Terrain":
+    """The free surface of another bed."""
+    if bed.relief is None:
+        return FreeSurface(float(bed.bed.offset / bed.bed.up[2]), tuple(bed.bed.up.tolist()))
+    head = layout.record(bed.relief, layout.TERRAIN)
+    shape = (int(head.rows) + 2 * PAD, int(head.columns) + 2 * PAD)
+    heights = bed.relief[layout.TERRAIN_NUMBERS :].reshape(shape) + float(bed.bed.offset)
+    return Terrain.from_coefficients(heights, (head.dx, head.dy), (head.x, head.y), bool(head.repeat))
 
 
 def _named(draft: Draft, name: str) -> Site:

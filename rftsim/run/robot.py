@@ -59,7 +59,7 @@ def measure(model: mujoco.MjModel, data: mujoco.MjData, body: str, lift: float |
     lift = against_gravity(model, total_force(model, data)) if lift is None else lift
     return Robot(
         body,
-        -float(ground(model, data).depth(data.body(body).xpos)),
+        -float(ground(model, data, instances(model)[0].name).depth(data.body(body).xpos)),
         {name: depth for name, depth in sinkages(model, data).items() if depth > 0.0},
         weight,
         lift / weight if weight > 0.0 else float("nan"),

@@ -8,7 +8,7 @@ BLOCK: Final = 8
 """Cells along the side of a block, whose mean the laws feel."""
 SIDES: Final = (32, 1024)
 """Fewest and most cells along a side of the window; a power of two."""
-FELT: Final = 1.5
+FELT: Final = 2.0
 """Side of a block over the width of what presses: about how far beside it the sand's weight holds it."""
 
 
@@ -24,7 +24,7 @@ class Ruts:
     """
 
     spacing: float
-    """Side of a cell [m]; the laws feel the mean over 8 x 8 cells, which should be 1.5 times as wide as a foot."""
+    """Side of a cell [m]; the laws feel the mean over 8 x 8 cells, which should be twice as wide as a foot."""
     window: tuple[float, float]
     """Lengths of the window along x and y [m]; rounded up to a power of two of cells."""
 
@@ -52,8 +52,8 @@ class Ruts:
 def ruts_for(width: float, extent: tuple[float, float]) -> Ruts:
     """The ruts of bodies of which the narrowest that presses has a width [m], and that extend so far along x and y [m].
 
-    The window has room for twice that beside them, up to 256 cells along a side.
+    The window is twice as long as they, within 64 to 256 cells along a side.
     """
     spacing = FELT * width / BLOCK
-    x, y = (min(256 * spacing, max(3.0 * length, 64 * spacing)) for length in extent)
+    x, y = (min(256 * spacing, max(2.0 * length, 64 * spacing)) for length in extent)
     return Ruts(spacing, (x, y))

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rftsim.model.bounds import bounds, corners
+from rftsim.model.ground import ground
 from rftsim.model.readout import instances
 from rftsim.surface.triangles import Array
-from rftsim.view.ground import surface_of
 
 Camera: TypeAlias = int | str | mujoco.MjvCamera
 """Id or name of a camera of the model, or a free camera."""
@@ -88,7 +88,7 @@ def as_free(model: mujoco.MjModel, camera: Camera) -> mujoco.MjvCamera:
 
 def _height(model: mujoco.MjModel, data: mujoco.MjData, place: Array) -> float:
     """Height of a place over the highest sand [m]; infinite where there is none."""
-    beds = [surface_of(model, data, bed) for bed in instances(model)]
+    beds = [ground(model, data, bed.name) for bed in instances(model)]
     return min((float(place[2] - bed.height_at(place[0], place[1])) for bed in beds), default=math.inf)
 
 

@@ -10,12 +10,12 @@ from scipy.spatial import cKDTree
 
 from rftsim.model.bounds import bounds
 from rftsim.model.geometry import MESHES, bounding_geoms
+from rftsim.model.ground import ground
 from rftsim.model.readout import Instance, body_velocities, instances, tractions, wrenches
 from rftsim.model.shaping import Fineness, body_surface
 from rftsim.model.standing import moving_weight
 from rftsim.surface.triangles import Array
 from rftsim.view.forces import resultants
-from rftsim.view.ground import surface_of
 from rftsim.view.tiles import Tiles
 
 
@@ -129,8 +129,8 @@ def describe(model: mujoco.MjModel) -> Portrait:
 
 
 def _make_tiles(model: mujoco.MjModel, data: mujoco.MjData, bed: Instance, extent: float) -> Tiles | None:
-    spacing = getattr(surface_of(model, data, bed), "spacing", None)
-    return None if spacing is None else Tiles(float(np.min(spacing)), extent)
+    spacing = ground(model, data, bed.name).spacing
+    return None if spacing is None else Tiles(min(spacing), extent)
 
 
 def note_ground(portrait: Portrait, data: mujoco.MjData, time: float) -> None:
@@ -138,7 +138,7 @@ def note_ground(portrait: Portrait, data: mujoco.MjData, time: float) -> None:
     for bed, _, tiles in portrait.beds:
         if tiles is not None:
             places = data.xpos[list(bed.bodies), :2]
-            tiles.note(places, surface_of(portrait.model, data, bed).height_at, time)
+            tiles.note(places, ground(portrait.model, data, bed.name), time)
 
 
 def _make_skin(model: mujoco.MjModel, start: mujoco.MjData, body: int) -> Skin:

@@ -17,7 +17,7 @@ from rftsim.model.standing import moving_weight
 from rftsim.run.robot import against_gravity, total_force
 from rftsim.view.cameras import framing
 from rftsim.view.drawing import Drawing, Shown
-from rftsim.view.ground import Ground
+from rftsim.view.fields import Fields
 from rftsim.view.look import dress, sand_geoms
 from rftsim.view.tractions import said
 
@@ -90,7 +90,7 @@ class Live:
         self._drawing, self._opacity, self._owed = Drawing(model), 0, 0.0
         dress(model, self._drawing.extent)
         self._cover()
-        self._ground, self._looked = Ground(model), -math.inf
+        self._ground, self._looked = Fields(model), -math.inf
         self.look(0.0)
         self._pressed: list[int] = []
 

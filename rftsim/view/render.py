@@ -12,7 +12,7 @@ from scipy.ndimage import binary_dilation
 from rftsim.view.cameras import SIZE, Camera, as_free, framing
 from rftsim.view.canvas import SKY, Canvas, Shot
 from rftsim.view.drawing import FORCES, Drawing, Shown
-from rftsim.view.ground import Ground
+from rftsim.view.fields import Fields
 from rftsim.view.look import CLEAR, WIDE, horizon, make_solid, painted, period, sand_geoms, shine, veil
 
 Picture: TypeAlias = NDArray[np.uint8]
@@ -45,7 +45,7 @@ class Pictures:
         self, model: mujoco.MjModel, width: int = SIZE[0], height: int = SIZE[1], shown: Shown = FORCES
     ) -> None:
         self._aspect, self._model, self._shown = width / height, model, shown
-        self._drawing, self._ground, self._sky = Drawing(model), Ground(model), horizon(model)
+        self._drawing, self._ground, self._sky = Drawing(model), Fields(model), horizon(model)
         with painted(model):
             self._canvas = Canvas(model, width, height, self._drawing.extent)
         self._sand = sand_geoms(model).keys()

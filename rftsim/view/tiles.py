@@ -5,7 +5,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rftsim.model.relief import Heights
+from rftsim.model.ground import Ground
 from rftsim.surface.triangles import Array
 
 CELLS: Final = 24
@@ -28,6 +28,8 @@ class Moment(NamedTuple):
     """Time of the recording [s]."""
     heights: "NDArray[np.float32]"
     """Heights of its vertices [m], shape (CELLS + 1, CELLS + 1): rows along y."""
+    marks: "NDArray[np.float32]"
+    """The same over the undisturbed ground."""
 
 
 class Tiles:
@@ -45,23 +47,24 @@ class Tiles:
         self.cell, self._extent = cell, extent
         self.kept: dict[Place, list[Moment]] = {}
 
-    def note(self, bodies: Array, heights: Heights, time: float) -> None:
+    def note(self, bodies: Array, ground: Ground, time: float) -> None:
         """Keep the ground around bodies, where it is new, and near them, where it has changed.
 
         Args:
             bodies: Their places [m], shape (n, 2).
-            heights: Height of the ground [m] over places.
+            ground: The ground as it is.
             time: Time of the recording [s].
         """
         wanted = sorted(self._around(bodies, AROUND) - self.kept.keys() | self._around(bodies, NEAR))
         if not wanted:
             return
         x, y = np.moveaxis(self.vertices(np.array(wanted)), -1, 0)
-        found = np.asarray(heights(x, y), dtype=np.float32)
-        for place, own in zip(wanted, found, strict=True):
-            before = self.kept.setdefault(place, [])
-            if not before or np.abs(before[-1].heights - own).max() > SEEN * self.cell:
-                before.append(Moment(time, own))
+        heights = np.asarray(ground.height_at(x, y))
+        marks = (heights - ground.undisturbed_at(x, y)).astype(np.float32)
+        for place, *found in zip(wanted, heights.astype(np.float32), marks, strict=True):
+            before, now = self.kept.setdefault(place, []), Moment(time, *found)
+            if not before or np.abs(before[-1].heights - now.heights).max() > SEEN * self.cell:
+                before.append(now)
 
     def vertices(self, places: NDArray[np.integer[Any]]) -> Array:
         """X and y [m] of the vertices of tiles, (n, 2), shape (n, CELLS + 1, CELLS + 1, 2)."""

@@ -77,10 +77,10 @@ def test_a_picture_of_any_model(capsys, robot, tmp_path):
 
 
 def test_a_film_of_any_model(capsys, robot, tmp_path):
-    """Thirty pictures a second, of the size of pictures; refused where it could not be written, before the run."""
+    """With ruts, thirty pictures a second, of the size of pictures; refused at once where it cannot be written."""
     av = pytest.importorskip("av")
     film = tmp_path / "robot.mp4"
-    report(capsys, "run", robot, "--duration", 0.2, "--video", film)
+    report(capsys, "run", robot, "--duration", 0.2, "--ruts", "--video", film)
     with av.open(str(film)) as container:
         frames = [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
     assert len(frames) == 6

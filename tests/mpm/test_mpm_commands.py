@@ -13,6 +13,7 @@ STUDIES = [
     ["plate", "--quick"],
     ["plate", "--quick", "--dim", "3", "--depth", "0.005", "--bed", "0.3", "--speed", "0.5"],
     ["case", "4", "--quick", "--depth", "0.01", "--bed", "0.2", "0.1"],
+    ["slope", "--quick", "--depth", "0.005", "--buried", "0.1"],
     ["wheel", "--quick", "--duration", "0.02"],
     ["collapse", "--quick", "--aspects", "0.5", "1.0", "--cells", "6"],
 ]
@@ -44,6 +45,7 @@ def test_the_same_for_people(capsys):
         (["plate", "--plot", "absent/x.png"], "no folder absent"),
         (["plate", "--plot", "x.bmp"], "must end in .png"),
         (["plate", "--record", "x.mp4"], "must end in .rrd"),
+        (["slope", "--slope", "30"], "does not stand at 30 degrees"),
         (["drag", "--depths", "0.02"], "two depths"),
         (["wheel", "--grousers", "500"], "do not fit"),
         (["wheel", "--dx", "0.02"], "too thin"),

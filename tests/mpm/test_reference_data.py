@@ -16,7 +16,7 @@ def plates():
     return results(DATA / "plates")
 
 
-@pytest.mark.parametrize("name", ["plates", "flat", "deep", "rates", "wheels", "solids"])
+@pytest.mark.parametrize("name", ["plates", "flat", "deep", "rates", "wheels", "solids", "slopes"])
 def test_they_are_whole(name):
     """Everything that was asked for is there, as it was written."""
     found = status(DATA / name)

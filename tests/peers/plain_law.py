@@ -16,6 +16,7 @@ import numpy as np
 
 from rftsim.bench import kernel, loops
 from rftsim.law import tables
+from rftsim.law.evaluate import handle
 from rftsim.law.laws import get_law
 from rftsim.law.layout import COLUMN, pack_bed, pack_surface, read_columns
 from rftsim.law.leading import SHARP, Edge, reach2
@@ -55,8 +56,8 @@ def compare(plain, size):
     position, turn, velocity, omega = kernel._motion(surface)
     columns, numbers = np.concatenate(read_columns(body)), case(surface, position, velocity, omega)
     bed = pack_bed(kernel.SAND, get_law(kernel.LAW), FreeSurface(), (0.0, 1.0, 0.0))
-    wrenches = np.zeros((1 + len(VARIANTS), 6))
-    works = [functools.partial(loops.evaluate, bed, body, position, turn, velocity, omega, wrenches[0])]
+    sand, wrenches = handle(bed), np.zeros((1 + len(VARIANTS), 6))
+    works = [functools.partial(loops.evaluate, sand, body, position, turn, velocity, omega, wrenches[0])]
     for name, out in zip(VARIANTS, wrenches[1:], strict=True):
         works.append(functools.partial(in_c, getattr(plain, name), columns, numbers, out))
     ours, *theirs = kernel._least(works, lambda _: None)

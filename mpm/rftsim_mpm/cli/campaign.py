@@ -1,4 +1,4 @@
-"""The commands `rftsim-mpm campaign ...`: grids of plates, pushes and wheels."""
+"""The commands `rftsim-mpm campaign ...`: grids of plates, pushes, wheels and slopes."""
 
 import dataclasses
 import os
@@ -62,13 +62,13 @@ class Work:
 
 @dataclasses.dataclass(frozen=True)
 class CampaignRun:
-    """Compute the plates, pushes and wheels of a TOML file; what is there already is kept.
+    """Compute the plates, pushes, wheels and slopes of a TOML file; what is there already is kept.
 
     Example: rftsim-mpm campaign run plates.toml out/plates
     """
 
     file: Folder
-    """TOML: [[plates]], [[pushes]] or [[wheels]] whose lists are the axes of a grid, and [defaults] for all."""
+    """TOML: [[plates]], [[pushes]], [[wheels]] or [[slopes]] with lists for the axes of a grid, and [defaults]."""
     folder: Folder
     """Where manifest.json and results/ go."""
     work: tyro.conf.OmitArgPrefixes[Work] = dataclasses.field(default_factory=Work)
@@ -146,7 +146,7 @@ class CampaignCommand(
         | Annotated[CampaignVerify, tyro.conf.subcommand("verify")]
     ]
 ):
-    """A grid of plates, pushes or wheels as independent processes; stop it in any way, and resume."""
+    """A grid of plates, pushes, wheels or slopes as independent processes; stop it in any way, and resume."""
 
 
 def _say(folder: Path, found: Status, json: bool, more: dict[str, Any]) -> None:

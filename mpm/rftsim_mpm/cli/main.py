@@ -13,10 +13,12 @@ from rftsim_mpm.cli.case import CaseCommand
 from rftsim_mpm.cli.ends import ERRORS, REFUSED, STOPPED, parsed, said, terminable
 from rftsim_mpm.cli.plate import PlateCommand
 from rftsim_mpm.cli.push import PushCommand
+from rftsim_mpm.cli.slope import SlopeCommand
 from rftsim_mpm.cli.studies import CollapseCommand, DragCommand, WheelCommand
 
 Command = (
     Annotated[PlateCommand, tyro.conf.subcommand("plate")]
+    | Annotated[SlopeCommand, tyro.conf.subcommand("slope")]
     | Annotated[PushCommand, tyro.conf.subcommand("push")]
     | Annotated[DragCommand, tyro.conf.subcommand("drag")]
     | Annotated[WheelCommand, tyro.conf.subcommand("wheel")]

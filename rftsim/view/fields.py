@@ -1,14 +1,16 @@
 """The height fields that draw a model's sand, kept as its surface is and where its bodies are."""
 
+import math
 from collections.abc import Sequence
-from typing import Any, Final
+from typing import Final
 
 import mujoco
 import numpy as np
 
+from rftsim.law import layout
+from rftsim.model.ground import Ground, ground
 from rftsim.model.readout import Instance, instances
 from rftsim.model.relief import Field, Level, centres, join_fields, sample_field
-from rftsim.sand.free_surface import FreeSurface
 from rftsim.surface.triangles import Array
 from rftsim.view.look import period, sand_geoms
 
@@ -16,7 +18,7 @@ SEEN: Final = 1e-3
 """Change of a height that is drawn, over the cell."""
 
 
-class Ground:
+class Fields:
     """The height fields of a model's beds, which `follow` the bodies and show the sand as it is in some data.
 
     Args:
@@ -30,7 +32,7 @@ class Ground:
             kind = int(mujoco.mjtGeom.mjGEOM_HFIELD)
             geoms = [geom for geom, name in drawn.items() if name == bed.name and model.geom_type[geom] == kind]
             if geoms:
-                self._beds.append(_Fields(model, bed, geoms))
+                self._beds.append(_Bed(model, bed, geoms))
 
     def follow(self, data: mujoco.MjData) -> list[int]:
         """Take over the surface of the sand and the places of the bodies from the model's data.
@@ -44,25 +46,29 @@ class Ground:
         return [changed for bed in self._beds for changed in bed.follow(data)]
 
 
-class _Fields:
-    """The height fields of one bed, finest first."""
+class _Bed:
+    """The height fields of a bed, finest first."""
 
     def __init__(self, model: mujoco.MjModel, bed: Instance, geoms: Sequence[int]) -> None:
         self._model, self._bed = model, bed
         self._geoms = sorted(geoms, key=lambda geom: _level(model, geom).cell)
         self._levels = [_level(model, geom) for geom in self._geoms]
-        self._grain = period(model, self._geoms[0])
+        cell = self._levels[0].cell
+        self._grain = cell * 2.0 ** round(math.log2(period(model, self._geoms[0]) / cell))  # exactly, as it was made
         self._sampled: list[Field] = []
+        self._numbers = np.empty(0)
         self._shown: list[Field | None] = [None] * len(self._geoms)
         self._places = np.array(model.geom_pos[self._geoms])
         model.geom_sameframe[self._geoms] = int(mujoco.mjtSameFrame.mjSAMEFRAME_NONE)
 
     def follow(self, data: mujoco.MjData) -> list[int]:
-        surface = surface_of(self._model, data, self._bed)
-        focus = data.xpos[list(self._bed.bodies), :2].mean(axis=0)
-        around = centres(self._levels, focus, self._grain)
+        surface = ground(self._model, data, self._bed.name)
+        self._forget()
+        around = centres(self._levels, self._focus(surface, data), self._grain)
         self._sampled = [
-            sample_field(level, centre, surface.height_at) if self._stale(k, centre) else self._sampled[k]
+            sample_field(level, centre, surface.undisturbed_at if k else surface.height_at)
+            if self._stale(k, centre)
+            else self._sampled[k]
             for k, (level, centre) in enumerate(zip(self._levels, around, strict=True))
         ]
         fields = join_fields(self._levels, self._sampled)
@@ -70,8 +76,22 @@ class _Fields:
         self._model.geom_pos[self._geoms] = data.geom_xpos[self._geoms] = self._places
         return changed
 
+    def _focus(self, surface: Ground, data: mujoco.MjData) -> Array:
+        """The middle of where marks are, or of the bodies where there are none, x and y [m]."""
+        places: Array = data.xpos[list(self._bed.bodies), :2]
+        if surface.window is not None and layout.ruts_size(self._bed.bed):
+            places = np.array(surface.window)
+        return np.asarray(places.mean(axis=0))
+
+    def _forget(self) -> None:
+        """Forget what was looked up of a surface that has been moved, or changed in place, since."""
+        bed = self._bed
+        numbers = np.array([bed.bed.offset, *bed.bed.up, *(() if bed.relief is None else bed.relief)])
+        if not np.array_equal(numbers, self._numbers):
+            self._sampled, self._numbers = [], numbers
+
     def _stale(self, k: int, centre: Array) -> bool:
-        """Whether a field has to be looked up: the finest always, for marks, and others at another place."""
+        """Whether a field has to be looked up: the finest, which alone shows marks, always; others at another place."""
         return k == 0 or not self._sampled or (self._sampled[k].centre != centre).any()
 
     def _differs(self, k: int, field: Field) -> bool:
@@ -98,8 +118,3 @@ def _level(model: mujoco.MjModel, geom: int) -> Level:
     one = model.geom_dataid[geom]
     cells = int(model.hfield_ncol[one]) - 1
     return Level(cells, 2.0 * float(model.hfield_size[one, 0]) / cells)
-
-
-def surface_of(model: mujoco.MjModel, data: mujoco.MjData, bed: Instance) -> Any:
-    """The surface of a bed as it is in some data."""
-    return FreeSurface(float(bed.bed.offset / bed.bed.up[2]), tuple(bed.bed.up.tolist()))
