@@ -60,6 +60,7 @@ class CLegHexapod(Task):
     """
 
     Settings = HexapodConfig
+    length = HEXAPOD.length
     edge = parts.AS_MESHED
     naction = len(LEGS)
     training = Training(

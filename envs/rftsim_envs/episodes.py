@@ -9,6 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 from rftsim_envs.ground import Ground, draw
 from rftsim_envs.limits import Limits
 from rftsim_envs.physics import Array, Flags, Physics
+from rftsim_envs.scan import Scan
+from rftsim_envs.start import Placer
 from rftsim_envs.task import Moment, Task
 
 Observation = NDArray[np.float32]
@@ -43,7 +45,9 @@ class Episodes:
     def __init__(self, task: Task, physics: Physics) -> None:
         task.prepare(physics.model)
         self.task, self.physics, n = task, physics, physics.n
-        self.ground, self._limits = Ground(physics, task.config), Limits(physics)
+        self.ground = Ground(physics, task.config)
+        self._limits, self._scan = Limits(physics, self.ground.relief), Scan(task)
+        self._placer = None if self.ground.relief.is_level else Placer(task, physics.model, self.ground.relief)
         self._qpos, self._qvel = physics.field("qpos"), physics.field("qvel")
         self._ctrl, self._sensors = physics.field("ctrl"), physics.field("sensordata")
         self._command, self._action = np.zeros((n, task.ncommand)), np.zeros((n, task.naction))
@@ -61,6 +65,8 @@ class Episodes:
                 self._qpos[i], self._qvel[i] = model.key_qpos[0], model.key_qvel[0]
                 self._ctrl[i] = model.key_ctrl[0]
                 self._command[i] = self.task.start(rng, self._qpos[i], self._qvel[i])
+                if self._placer is not None:
+                    self._placer.place(i, rng, self._qpos[i])
 
         self.physics.restart(chosen, place)
         for kept in (self._count, self._energy, self._distance, self._action, self._last):
@@ -119,10 +125,13 @@ class Episodes:
             last=self._last,
             power=power,
             period=self.task.config.period,
+            relief=self.ground.relief,
         )
 
     def _observe(self, moment: Moment) -> Observation:
         seen = self.task.observe(moment)
+        if self.task.config.scan:
+            seen = np.hstack([seen, self._scan.heights(moment)])
         if self.task.config.observe_ground:
             seen = np.hstack([seen, self.ground.draws])
         return seen.astype(np.float32)

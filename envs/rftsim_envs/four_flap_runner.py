@@ -50,7 +50,7 @@ class FourFlapRunner(Task):
     | sine and cosine of four times the angle | 2 | - |
     | rate | 1 | 15 rad/s |
     | velocity along x and z | 2 | sqrt(g l) = 1.36 m/s |
-    | height of the axle | 1 | 0.1 m |
+    | height of the axle, less outer radius | 1 | 0.1 m |
     | last action | 1 | - |
 
     Reward per second: v / sqrt(g l) - energy (P / (m g sqrt(g l)))^2, v the speed along x and P the drive's positive
@@ -63,6 +63,7 @@ class FourFlapRunner(Task):
     Settings = RunnerConfig
     felt = (WHEEL,)
     planar = True
+    length = 2.0 * RUNNER.outer_radius
     edge = 2 * RUNNER.width
     naction = 1
     training = Training(steps=300_000, n_steps=64, batch_size=256, n_epochs=10, learning_rate=8e-4, log_std_init=-2.0)
@@ -84,7 +85,8 @@ class FourFlapRunner(Task):
     def observe(self, moment: Moment) -> Array:
         """The observation of the class's table, (n, 7)."""
         angle, (vx, vz, rate) = 4.0 * moment.qpos[:, 2], moment.qvel.T
-        columns = np.sin(angle), np.cos(angle), rate / 15.0, vx / UNIT, vz / UNIT, 10.0 * moment.qpos[:, 1]
+        height = moment.qpos[:, 1] - self.ground_below(moment)
+        columns = np.sin(angle), np.cos(angle), rate / 15.0, vx / UNIT, vz / UNIT, 10.0 * height
         return np.column_stack([*columns, moment.action])
 
     def rewards(self, moment: Moment) -> dict[str, Array]:

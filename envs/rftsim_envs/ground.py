@@ -6,9 +6,11 @@ from typing import Final, NamedTuple
 import mujoco
 import numpy as np
 
+from rftsim.law import layout
 from rftsim.model.add_sand import WHOLE, add_sand
 from rftsim.model.readout import instances
 from rftsim_envs.physics import Physics
+from rftsim_envs.relief import LEVEL, Relief
 from rftsim_envs.task import Config, Task
 
 FRICTION: Final = 0.8
@@ -35,7 +37,9 @@ def lay(task: Task, robot: mujoco.MjSpec | None = None) -> mujoco.MjModel:
     config, spec = task.config, task.build() if robot is None else robot
     spec.option.timestep = config.timestep
     if config.ground == "sand":
-        options = {"bodies": task.felt, "max_edge": task.edge, **WHOLE, **task.options()}
+        options = {"bodies": task.felt, "max_edge": task.edge, **WHOLE, "ruts": config.ruts, **task.options()}
+        if task.dunes is not None:
+            options["terrain"] = task.dunes
         solution = {"tolerance": config.tolerance, "iterations": config.iterations}
         add_sand(spec, config.sand, config.law, **{**solution, **options})
     else:
@@ -83,6 +87,7 @@ class Ground:
         draws: Numbers that tell of each ground, (n, NUMBERS): log of strength and friction, sines of the slope along x
             and y.
         gravity: Unit vectors downward, (n, 3).
+        relief: Heights of the ground.
     """
 
     def __init__(self, physics: Physics, config: Config) -> None:
@@ -90,13 +95,18 @@ class Ground:
         self._pull = float(np.linalg.norm(model.opt.gravity))
         self._gravity = physics.setting("opt.gravity")
         self.gravity = np.tile([0.0, 0.0, -1.0], (physics.n, 1))
-        self.draws = np.zeros((physics.n, NUMBERS))
+        self.draws, self.relief = np.zeros((physics.n, NUMBERS)), LEVEL
         if self._rigid:
             self._sliding = physics.setting("geom_friction")[:, model.geom(FLOOR).id]
             self._before = self._sliding[0].copy()
         else:
-            self._beds = instances(model)[0].beds_in(physics.setting("numeric_data"))
+            bed, numbers = instances(model)[0], physics.setting("numeric_data")
+            self._beds = bed.beds_in(numbers)
             self._before = self._beds[0].copy()
+            if bed.relief is not None:
+                start = (bed.relief.ctypes.data - model.numeric_data.ctypes.data) // bed.relief.itemsize
+                heads = numbers[:, start : start + layout.TERRAIN_NUMBERS].view(layout.TERRAIN)[:, 0]
+                self.relief = Relief(bed.relief, heads)
 
     def put(self, i: int, drawn: Draw) -> None:
         """Give simulation i the ground of an episode."""

@@ -85,6 +85,7 @@ class GrouserWheel(Task):
     Settings = WheelConfig
     felt = (WHEEL,)
     planar = True
+    length = 2.0 * RADIUS
     edge = 2 * GROUSER_WHEEL.width
     ncommand = 2
     naction = 1
@@ -112,7 +113,7 @@ class GrouserWheel(Task):
         """The observation of the class's table, (n, 8) or, with the drawbar load, (n, 9)."""
         (vx, vz, rate), (command, drawbar) = moment.qvel.T, moment.command.T
         speeds = np.column_stack([command, command - vx, vx, vz, RADIUS * rate, RADIUS * rate - vx]) / UNIT
-        seen = [speeds, -moment.qpos[:, 1:2] / RADIUS, moment.action]
+        seen = [speeds, self._sinkage(moment)[:, None] / RADIUS, moment.action]
         return np.column_stack([*seen, drawbar / WEIGHT] if self.config.observe_drawbar else seen)
 
     def rewards(self, moment: Moment) -> dict[str, Array]:
@@ -133,8 +134,13 @@ class GrouserWheel(Task):
             "drawbar": moment.command[:, 1].copy(),
             "rate": rate,
             "slip": slip(RADIUS * rate, speed),
-            "sinkage": -moment.qpos[:, 1],
+            "sinkage": self._sinkage(moment),
         }
+
+    def _sinkage(self, moment: Moment) -> Array:
+        """Outer radius less the height of the axle above the ground [m], (n,)."""
+        sinkage: Array = self.ground_below(moment) - moment.qpos[:, 1]
+        return sinkage
 
 
 def tracking(speed: Array, command: Array, spread: float) -> Array:

@@ -70,6 +70,7 @@ class Hopper(Task):
 
     Settings = HopperConfig
     planar = True
+    length = HOPPER.torso_height + HOPPER.thigh + HOPPER.shank
     edge = parts.AS_MESHED
     ncommand = 1
     naction = len(JOINTS)
@@ -97,7 +98,7 @@ class Hopper(Task):
         """The observation of the class's table, (n, 16)."""
         columns = [
             moment.command,
-            moment.qpos[:, 1:2] / 0.5,
+            self._height(moment)[:, None] / 0.5,
             _lean(moment),
             moment.qpos[:, 3:] - POSE,
             moment.qvel[:, :2],
@@ -119,7 +120,7 @@ class Hopper(Task):
 
     def failed(self, moment: Moment) -> Flags:
         """Whether the hip is below LOWEST or the torso leans beyond STEEPEST, (n,)."""
-        fallen: Flags = (moment.qpos[:, 1] < LOWEST) | (_lean(moment)[:, 1] > -np.cos(STEEPEST))
+        fallen: Flags = (self._height(moment) < LOWEST) | (_lean(moment)[:, 1] > -np.cos(STEEPEST))
         return fallen
 
     def measures(self, moment: Moment) -> dict[str, Array]:
@@ -127,8 +128,17 @@ class Hopper(Task):
         return {
             "speed": self.speed(moment),
             "command": moment.command[:, 0].copy(),
-            "height": moment.qpos[:, 1].copy(),
+            "height": self._height(moment),
         }
+
+    def lean(self, qpos: Array, slope: Array) -> None:
+        """Let the foot alone lean with the ground, so that the hopper stands over it."""
+        qpos[-1] = np.clip(qpos[-1] - np.arctan(slope[0]), *RANGES[-1])
+
+    def _height(self, moment: Moment) -> Array:
+        """Height of the hip over the ground [m], (n,)."""
+        height: Array = moment.qpos[:, 1] - self.ground_below(moment)
+        return height
 
     def open_loops(self) -> dict[str, Drive]:
         """Strokes at constant rates: the leg's length follows a sine, and the hip swings with it or ahead."""

@@ -7,13 +7,15 @@ from rftsim.law.layout import HEADER, record
 from rftsim.model.readout import instances
 from rftsim.run.validity import DEPTH_LIMIT, FROUDE_LIMIT
 from rftsim_envs.physics import Physics
+from rftsim_envs.relief import Relief
 from rftsim_envs.task import cross
 
 
 class Limits:
     """The numbers of `rftsim.validity`, from the boxes around the bodies that feel the sand, not their triangles."""
 
-    def __init__(self, physics: Physics) -> None:
+    def __init__(self, physics: Physics, relief: Relief) -> None:
+        self._relief = relief
         beds = instances(physics.model)
         self._bodies = [body for bed in beds for body in bed.bodies]
         if not self._bodies:
@@ -35,7 +37,8 @@ class Limits:
         turn = self._turn[:, self._bodies].reshape(-1, len(self._bodies), 3, 3)
         arm = np.einsum("nbij,bj->nbi", turn, self._centre)
         centre = self._place[:, self._bodies] + arm
-        depth = np.einsum("nbi,bi->nb", np.abs(turn[:, :, 2]), self._half) - centre[:, :, 2]
+        height = centre[:, :, 2] - self._relief.height(centre[:, :, 0], centre[:, :, 1])
+        depth = np.einsum("nbi,bi->nb", np.abs(turn[:, :, 2]), self._half) - height
         twist = self._velocity[:, self._bodies]
         velocity = twist[..., 3:] + cross(twist[..., :3], centre - self._com[:, self._roots])
         touched = depth > 0.0

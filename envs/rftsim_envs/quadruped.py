@@ -41,6 +41,8 @@ class QuadrupedConfig(Config):
     """
 
     sand: str = "close-poppy-seeds"
+    amplitude: float = 0.03
+    wavelength: float = 1.5
     period: float = 0.04
     forward: tuple[float, float] = (0.2, 0.6)
     sideways: tuple[float, float] = (-0.1, 0.1)
@@ -90,6 +92,7 @@ class Quadruped(Task):
 
     Settings = QuadrupedConfig
     felt = (parts.TORSO, *FEET)
+    length = QUADRUPED.length
     edge = parts.AS_MESHED
     ncommand = 3
     naction = len(JOINTS)
@@ -153,7 +156,7 @@ class Quadruped(Task):
     def failed(self, moment: Moment) -> Flags:
         """Whether the torso has tipped over or is down on the ground, (n,)."""
         upright = -to_body(moment.qpos[:, 3:7], moment.gravity)[:, 2]
-        return (upright < TIPPED) | (moment.qpos[:, 2] < GROUNDED)
+        return (upright < TIPPED) | (self._height(moment) < GROUNDED)
 
     def measures(self, moment: Moment) -> dict[str, Array]:
         """Velocity ahead and to the left, yaw rate, error, height and tilt, as the class says, (n,) each."""
@@ -164,13 +167,18 @@ class Quadruped(Task):
             "sideways": sideways,
             "turning": _turning(moment),
             "error": np.linalg.norm(_velocity(moment) - moment.command[:, :2], axis=1),
-            "height": moment.qpos[:, 2].copy(),
+            "height": self._height(moment),
             "tilt": np.arccos(np.clip(-down[:, 2], -1.0, 1.0)),
         }
 
     def speed(self, moment: Moment) -> Array:
         """Mean speed ahead over the step [m/s], (n,)."""
         return _velocity(moment)[:, 0]
+
+    def _height(self, moment: Moment) -> Array:
+        """Height of the torso's middle above the ground [m], (n,)."""
+        height: Array = moment.qpos[:, 2] - self.ground_below(moment)
+        return height
 
 
 def closeness(error: Array, spread: float) -> Array:

@@ -1,4 +1,4 @@
-"""`rftsim/Rover-v0`: a six-wheeled rover drives to a goal over flat and tilted sand, without digging in."""
+"""`rftsim/Rover-v0`: a six-wheeled rover drives to a goal over level and tilted sand and dunes, without digging in."""
 
 import dataclasses
 from typing import Final
@@ -44,6 +44,8 @@ class RoverConfig(Config):
 
     sand: str = "medium-sand"
     slope_deg: float = 10.0
+    amplitude: float = 0.035
+    wavelength: float = 2.0
     period: float = 0.05
     duration: float = 20.0
     distance: tuple[float, float] = (1.0, 3.0)
@@ -92,6 +94,7 @@ class Rover(Task):
 
     Settings = RoverConfig
     felt = (parts.TORSO, *WHEELS)
+    length = 2.0 * (ROVER.spacing + RADIUS)
     edge = parts.AS_MESHED
     ncommand = 2
     naction = 2
@@ -109,10 +112,10 @@ class Rover(Task):
         return spec
 
     def prepare(self, model: mujoco.MjModel) -> None:
-        """Look up the robot's weight, its wheels' rates and its hubs' heights in the compiled model."""
+        """Look up the robot's weight, its wheels' rates and its hubs' places in the compiled model."""
         super().prepare(model)
         self._rates = [model.joint(wheel).dofadr[0] for wheel in WHEELS]
-        self._heights = [model.sensor(f"{wheel}_hub").adr[0] + 2 for wheel in WHEELS]
+        self._hubs = [model.sensor(f"{wheel}_hub").adr[0] + np.arange(3) for wheel in WHEELS]
 
     def start(self, rng: np.random.Generator, qpos: Array, qvel: Array) -> Array:
         """Leave the rover at rest on the ground; the command is the goal's place along x and y [m]."""
@@ -185,7 +188,8 @@ class Rover(Task):
 
     def _lowest(self, moment: Moment) -> Array:
         """Height of the lowest hub above the ground [m], (n,)."""
-        height: Array = moment.sensors[:, self._heights].min(axis=1)
+        x, y, z = np.moveaxis(moment.sensors[:, self._hubs], 2, 0)
+        height: Array = (z - moment.relief.height(x, y)).min(axis=1)
         return height
 
     def _passing(self, moment: Moment) -> Array:

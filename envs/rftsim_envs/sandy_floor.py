@@ -6,7 +6,6 @@ from typing import Any, Final, NamedTuple
 
 import mujoco
 
-from rftsim.errors import SceneError
 from rftsim.law.laws import Law
 from rftsim.model.add_sand import add_sand
 from rftsim.sand.medium import Sand
@@ -34,11 +33,6 @@ def turn_to_sand(spec: mujoco.MjSpec, recipe: Recipe) -> None:
         recipe: What to turn it to.
 
     Raises:
-        RftsimError: The scene cannot have sand, or its ground is a height field.
+        RftsimError: The scene cannot have sand.
     """
-    for geom in spec.geoms:
-        if geom.type == mujoco.mjtGeom.mjGEOM_HFIELD and (geom.contype or geom.conaffinity):
-            raise SceneError(
-                f"the ground {geom.name!r} is a height field, which cannot turn to sand: its surface is a plane"
-            )
     add_sand(spec, recipe.sand, recipe.law, **recipe.options)

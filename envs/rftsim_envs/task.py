@@ -3,7 +3,7 @@
 import abc
 import dataclasses
 import math
-from typing import Any, ClassVar, Literal, NamedTuple
+from typing import Any, ClassVar, Final, Literal, NamedTuple
 
 import mujoco
 import numpy as np
@@ -12,12 +12,16 @@ from rftsim.errors import RftsimError
 from rftsim.law import layout
 from rftsim.model.solution import check_solution
 from rftsim.sand.presets import make_sand
+from rftsim.sand.terrain import Terrain
 from rftsim_envs.physics import Array, Flags
 from rftsim_envs.recipe import Drive, Training
+from rftsim_envs.relief import LEVEL, Relief, make_dunes
 from rftsim_envs.settings import check_positive, convert_fields
 
 MOST_SUBSTEPS, MOST_STEPS = 1e6, 1e9
 """Most time steps of a control step, and most control steps of an episode."""
+MOST_PLACES: Final = 1000
+"""Most places along the heading at which the ground is scanned."""
 
 
 class ConfigError(RftsimError, ValueError):
@@ -37,7 +41,18 @@ class Config:
         strength: Range of the factor of the sand's strength (xi_n and zeta), drawn for each episode, log-uniform.
         friction: Range of the factor of the friction: mu_surf of the sand, or that of the rigid floor.
         slope_deg: Largest slope of the ground [deg], drawn uniformly for each episode, in any direction that the robot
-            can move in. The ground stays z = 0 and gravity leans.
+            can move in. The ground stays as it is and gravity leans: all of the ground at once, for ever, which costs
+            nothing, leaves level ground level, where the laws are calibrated, and has a steady state. Slopes that the
+            robot climbs and leaves are those of dunes, and are true ones; both can be had together.
+        terrain: `level`, or `dunes`: a field of them, of which each episode draws the place where it starts. Those of a
+            planar robot vary along x alone. Heights are then those above the ground below.
+        amplitude: Root mean square of the dunes' heights [m]; of 0 the ground is level.
+        wavelength: Dominant wavelength of the dunes [m].
+        ruts: Sand that remembers where the robot has passed, until the episode ends, see `rftsim.add_sand`.
+        scan: Number of places along the heading at which the observation tells the ground's height, zero or at least 2:
+            from half a robot's length behind its root to a length and a half ahead; of a robot that can turn along
+            three lines, half a length to the left, amid and to the right, one after the other. The heights are those of
+            the ground without ruts over the root, in lengths of the robot: `length` of the task.
         observe_ground: Let the observation end with the ground's draw: log of both factors, and the sines of the slope
             along x and y. Otherwise it is hidden.
         timestep: Time step of the physics [s].
@@ -53,6 +68,11 @@ class Config:
     strength: tuple[float, float] = (1.0, 1.0)
     friction: tuple[float, float] = (1.0, 1.0)
     slope_deg: float = 0.0
+    terrain: Literal["level", "dunes"] = "level"
+    amplitude: float = 0.015
+    wavelength: float = 1.0
+    ruts: bool = False
+    scan: int = 0
     observe_ground: bool = False
     timestep: float = 0.005
     period: float = 0.02
@@ -76,6 +96,22 @@ class Config:
             raise ConfigError(f"period = {self.period:g} s must be a multiple of timestep = {self.timestep:g} s")
         check_solution(self.tolerance, self.iterations, ConfigError)
         make_sand(self.sand)
+        self._check_terrain()
+
+    def _check_terrain(self) -> None:
+        """Refuse lengths and numbers of places that cannot be, and marks in a ground that keeps none."""
+        if not self.amplitude >= 0.0:
+            raise ConfigError(f"amplitude must be at least 0 m, not {self.amplitude:g}")
+        check_positive(self, ("wavelength",), ConfigError)
+        if self.scan != 0 and not 2 <= self.scan <= MOST_PLACES:
+            raise ConfigError(f"scan must be 0 or from 2 to {MOST_PLACES} places, not {self.scan}")
+        if self.ground == "rigid" and (self.ruts or self.has_dunes):
+            raise ConfigError("a rigid ground is level and keeps no ruts: take ground='sand'")
+
+    @property
+    def has_dunes(self) -> bool:
+        """Whether the ground has the relief of dunes."""
+        return self.terrain == "dunes" and self.amplitude > 0.0
 
     @property
     def substeps(self) -> int:
@@ -111,6 +147,8 @@ class Moment(NamedTuple):
     """Mean positive power of the actuators over the step [W], (n,)."""
     period: float
     """Duration of the control step [s]."""
+    relief: Relief = LEVEL
+    """Heights of the ground under each simulation."""
 
 
 class Task(abc.ABC):
@@ -121,10 +159,12 @@ class Task(abc.ABC):
     Attributes:
         Settings: Class of its configuration.
         felt: Bodies that feel the sand; None for all that can.
-        planar: Whether the robot moves in the x-z plane.
+        planar: Whether the robot moves in the x-z plane, on joints that slide along x and z; else its joint is free.
+        length: Length of the robot along its heading [m].
         edge: Longest edge of a felt triangle [m]; None for the one that `add_sand` chooses.
         ncommand: Number of numbers in a command.
         config: Its configuration.
+        dunes: The field of dunes that it runs on; None on level ground.
         weight: Weight of the robot, once the task is prepared [N].
         training: Settings by which a policy is trained.
     """
@@ -132,12 +172,14 @@ class Task(abc.ABC):
     Settings: ClassVar[type[Config]] = Config
     felt: ClassVar[tuple[str, ...] | None] = None
     planar: ClassVar[bool] = False
+    length: ClassVar[float]
     edge: ClassVar[float | None] = None
     ncommand: ClassVar[int] = 0
     training: ClassVar[Training] = Training()
 
     def __init__(self, config: Config) -> None:
         self.config = config
+        self.dunes = _dunes(config, self.planar) if config.has_dunes else None
 
     def options(self) -> dict[str, Any]:
         """Options of `add_sand` beyond those that the configuration and this class state."""
@@ -150,6 +192,10 @@ class Task(abc.ABC):
     def prepare(self, model: mujoco.MjModel) -> None:
         """Look up in the compiled model what the methods below need."""
         self.weight = float(model.body_mass.sum() * np.linalg.norm(model.opt.gravity))
+        data = mujoco.MjData(model)
+        data.qpos[:] = 0.0
+        mujoco.mj_kinematics(model, data)
+        self._raised = float(data.xpos[model.jnt_bodyid[1], 2]) if self.planar else 0.0
 
     @property
     @abc.abstractmethod
@@ -188,6 +234,30 @@ class Task(abc.ABC):
         """Mean speed along x over the step [m/s], (n,)."""
         return (moment.qpos[:, 0] - moment.before[:, 0]) / moment.period
 
+    def root(self, qpos: Array) -> Array:
+        """Place of the robot's root [m], (n, 3), at positions (n, nq)."""
+        if not self.planar:
+            return qpos[:, :3]
+        return np.column_stack([qpos[:, 0], np.zeros(len(qpos)), qpos[:, 1] + self._raised])
+
+    def heading(self, qpos: Array) -> Array:
+        """Angle of the robot's heading from x towards y [rad], (n,), at positions (n, nq)."""
+        return np.zeros(len(qpos)) if self.planar else yaw_of(qpos[:, 3:7])
+
+    def ground_below(self, moment: Moment) -> Array:
+        """Height of the ground below the root [m], (n,)."""
+        return moment.relief.height(*self.root(moment.qpos)[:, :2].T)
+
+    def lean(self, qpos: Array, slope: Array) -> None:
+        """Lean the start of an episode, (nq,), in place with a ground that rises by slope along x and y [-], (2,).
+
+        A robot that is free leans as the ground does; one that is planar keeps its pose.
+        """
+        if not self.planar:
+            up = np.array([-slope[0], -slope[1], 1.0]) / math.sqrt(1.0 + float(slope @ slope))
+            turn = np.array([1.0 + up[2], -up[1], up[0], 0.0])
+            mujoco.mju_mulQuat(qpos[3:7], turn / np.linalg.norm(turn), qpos[3:7].copy())
+
     def open_loops(self) -> dict[str, Drive]:
         """Controllers that see nothing, by name: the best of them is what a policy has to beat."""
         return {}
@@ -204,6 +274,29 @@ def make_config(task: type[Task], settings: dict[str, Any]) -> Config:
         if name not in known:
             raise ConfigError(f"{task.__name__} has no setting {name!r}; it has {', '.join(known)}")
     return task.Settings(**settings)
+
+
+def _dunes(config: Config, planar: bool) -> Terrain:
+    """The field of dunes of a configuration.
+
+    Raises:
+        ConfigError: It is steeper than its sand can lie.
+    """
+    try:
+        made = make_dunes(config.amplitude, config.wavelength, planar)
+    except ValueError as error:
+        raise ConfigError(str(error)) from None
+    most, steepest = make_sand(config.sand).repose - math.radians(config.slope_deg), made.steepest
+    if steepest > most:
+        more = f", and slope_deg leans them by {config.slope_deg:g} more" if config.slope_deg else ""
+        limit = config.amplitude * math.tan(max(most, 0.0)) / math.tan(steepest)
+        raise ConfigError(
+            f"dunes of amplitude {config.amplitude:g} m and wavelength {config.wavelength:g} m are as steep as "
+            f"{math.degrees(steepest):.3g} degrees{more}, beyond the sand's angle of repose of "
+            f"{math.degrees(make_sand(config.sand).repose):.3g}: take an amplitude of {limit:.3g} m at most, or longer "
+            "waves"
+        )
+    return made
 
 
 def cross(a: Array, b: Array) -> Array:

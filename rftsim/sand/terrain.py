@@ -181,25 +181,23 @@ def spline(
     (x0, y0), (dx, dy) = np.asarray(origin), np.asarray(spacing)
     j, along_x, turn_x = _weights((np.asarray(x, dtype=float) - x0) / dx, int(columns), repeat)
     i, along_y, turn_y = _weights((np.asarray(y, dtype=float) - y0) / dy, int(rows), repeat)
-    height = slope_x = slope_y = np.zeros(np.broadcast_shapes(i.shape, j.shape))
-    for a in range(3):
-        for b in range(3):
-            c = coefficients[i + a, j + b]
-            height = height + along_y[a] * along_x[b] * c
-            slope_x = slope_x + along_y[a] * turn_x[b] * c / dx
-            slope_y = slope_y + turn_y[a] * along_x[b] * c / dy
-    return height, slope_x, slope_y
+    width = coefficients.shape[1]
+    first = np.asarray(i * width + j)
+    around = np.add.outer(np.arange(3) * width, np.arange(3)).reshape(3, 3, *[1] * first.ndim)
+    nine = coefficients.ravel().take(first + around)
+    level, rising = (nine * along_x).sum(axis=1), (nine * turn_x).sum(axis=1)
+    return (along_y * level).sum(axis=0), (along_y * rising).sum(axis=0) / dx, (turn_y * level).sum(axis=0) / dy
 
 
-def _weights(t: Array, count: int, repeat: bool) -> tuple[Any, tuple[Array, ...], tuple[Array, ...]]:
-    """Of places in spacings: the first of three padded coefficients, their weights, and their derivatives'."""
+def _weights(t: Array, count: int, repeat: bool) -> tuple[Any, Array, Array]:
+    """Of places in spacings: the first of three padded coefficients, and (3, ...) their weights, and derivatives'."""
     if repeat:
         t = t - count * np.floor(t / count)
     t = np.clip(t, -2.0, count + 1.0)
     nearest = np.floor(t + 0.5)
     f = t - nearest
-    weights = 0.5 * (0.5 - f) ** 2, 0.75 - f**2, 0.5 * (0.5 + f) ** 2
-    return nearest.astype(int) + PAD - 1, weights, (f - 0.5, -2.0 * f, f + 0.5)
+    weights = np.array([0.5 * (0.5 - f) ** 2, 0.75 - f**2, 0.5 * (0.5 + f) ** 2])
+    return nearest.astype(int) + PAD - 1, weights, np.array([f - 0.5, -2.0 * f, f + 0.5])
 
 
 def _along(values: Array, repeat: bool) -> Array:

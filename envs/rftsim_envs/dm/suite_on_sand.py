@@ -8,17 +8,24 @@ from collections.abc import Iterator, Mapping
 from typing import Any, ClassVar, Final, NamedTuple
 
 import mujoco
+import numpy as np
 from dm_control import suite
 from dm_control.mujoco.wrapper import MjData, MjModel
 from dm_control.rl import control
 
 from rftsim.errors import SceneError
 from rftsim.law.laws import Law
+from rftsim.law.layout import TERRAIN_NUMBERS
+from rftsim.model.height_field import field_terrain
+from rftsim.model.readout import instances
+from rftsim.sand.free_surface import FreeSurface
 from rftsim.sand.medium import Sand
 from rftsim_envs.dm.whole_steps import WholeSteps
 from rftsim_envs.sandy_floor import Recipe, turn_to_sand
 
 _LOADING: Final = threading.RLock()
+FLAT: Final = 1e-9
+"""Height of a field that is as good as level [m]."""
 
 
 def on_sand(
@@ -35,7 +42,8 @@ def on_sand(
     """One of the suite's environments with its floor turned to sand.
 
     Specifications and rewards are its own. While an episode is prepared, the floor is solid, because tasks place
-    robots so that they touch nothing. Touch, force and torque sensors read the sand as they read that floor.
+    robots so that they touch nothing. Touch, force and torque sensors read the sand as they read that floor. A height
+    field is sand with its relief, as the episode has made it; slopes beyond the sand's angle of repose are not told of.
 
     Args:
         domain_name: Name of a domain, as `quadruped`.
@@ -48,7 +56,7 @@ def on_sand(
         **options: Those of `rftsim.add_sand`; without `sensors=True` there are none, as some tasks observe them all.
 
     Raises:
-        RftsimError: The scene cannot have sand, or its ground is a height field.
+        RftsimError: The scene cannot have sand.
         ValueError: There is no such domain or task.
     """
     if domain_name not in suite.TASKS_BY_DOMAIN:
@@ -68,6 +76,8 @@ class Floors(NamedTuple):
     """Their ids."""
     bits: tuple[tuple[int, int], ...]
     """The contype and conaffinity of each."""
+    field: int | None = None
+    """Id of the height field geom among them whose relief the sand has, where an episode makes it."""
 
 
 class OnSand(WholeSteps):
@@ -90,7 +100,19 @@ class OnSand(WholeSteps):
         with self._solid(True), super().reset_context():
             yield self
         if not before:
+            self._take_relief()
             self.after_reset()
+
+    def _take_relief(self) -> None:
+        """Give the sand the heights that the height field now has."""
+        if self.floors.field is None:
+            return
+        model, data = self.model.ptr, self.data.ptr
+        terrain, (bed,) = field_terrain(model, data, self.floors.field), instances(model)
+        assert bed.relief is not None, "sand in the place of a height field has relief"
+        bed.relief[TERRAIN_NUMBERS:] = (
+            terrain.height if isinstance(terrain, FreeSurface) else terrain.coefficients.ravel()
+        )
 
     @contextlib.contextmanager
     def _solid(self, solid: bool) -> Iterator[None]:
@@ -136,15 +158,43 @@ def _physics(domain: Any, text: "str | bytes", assets: Mapping[str, bytes] | Non
     spec = mujoco.MjSpec.from_string(text, include=dict(assets or {}), assets=dict(assets or {}))
     geoms = list(spec.geoms)
     before = [(geom.contype, geom.conaffinity) for geom in geoms]
-    turn_to_sand(spec, recipe)
+    blank = next((geom for geom in geoms if _is_blank(spec, geom)), None)
+    if blank is None:
+        turn_to_sand(spec, recipe)
+    else:
+        _turn_blank(spec, blank, recipe)
     changed = [(g, bits) for g, bits in zip(geoms, before, strict=True) if (g.contype, g.conaffinity) != bits]
     for geom, bits in changed:
         geom.contype, geom.conaffinity = bits  # as MuJoCo's trees of what may touch hold what can touch when compiled
     model = spec.compile()
-    floors = Floors(tuple(geom.id for geom, _ in changed), tuple(bits for _, bits in changed))
+    field = None if blank is None else blank.id
+    floors = Floors(tuple(geom.id for geom, _ in changed), tuple(bits for _, bits in changed), field)
     for geom in floors.geoms:
         model.geom_contype[geom] = model.geom_conaffinity[geom] = 0
     return _on_sand(domain, floors)(MjData(MjModel(model)))
+
+
+def _is_blank(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> bool:
+    """Whether a geom is a height field that collides and whose heights each episode makes."""
+    if geom.type != mujoco.mjtGeom.mjGEOM_HFIELD or not (geom.contype or geom.conaffinity):
+        return False
+    field = spec.hfield(geom.hfieldname)
+    return not field.file and not np.diff(field.userdata).any()
+
+
+def _turn_blank(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, recipe: Recipe) -> None:
+    """Turn a height field without heights, and floors at its level, to sand that can take any; no triangle is spared.
+
+    It stays in sight, of cameras and rangefinders, in place of a drawing of the sand. While the sand is written the
+    field has heights that are next to nothing, as a level one would count as a plane.
+    """
+    options = {"terrain": geom.name, "reduction": 0.0, "draw": False, **recipe.options}
+    field, colour = spec.hfield(geom.hfieldname), np.array(geom.rgba)
+    size, heights = np.array(field.size), np.array(field.userdata)
+    field.userdata = np.linspace(0.0, 1.0, field.nrow * field.ncol)
+    field.size = [*size[:2], FLAT, size[3]]
+    turn_to_sand(spec, recipe._replace(options=options))
+    field.userdata, field.size, geom.rgba = heights, size, colour
 
 
 @functools.cache

@@ -18,7 +18,14 @@ from rftsim_envs.tally import Tally
 from rftsim_envs.training import actors
 from rftsim_envs.training.folder import Folder, Plan
 
-LEVEL: Final[Mapping[str, Any]] = {"ground": "sand", "strength": (1.0, 1.0), "friction": (1.0, 1.0), "slope_deg": 0.0}
+LEVEL: Final[Mapping[str, Any]] = {
+    "ground": "sand",
+    "strength": (1.0, 1.0),
+    "friction": (1.0, 1.0),
+    "slope_deg": 0.0,
+    "terrain": "level",
+    "ruts": False,
+}
 """Settings of the task's own sand, level and alike in all episodes."""
 PRESETS: Final = ("poppy-seeds", "close-poppy-seeds", "glass-beads", "medium-sand")
 POLICY: Final = "policy"
@@ -34,6 +41,7 @@ GROUNDS: Final[Mapping[str, Mapping[str, Any]]] = {
     "twice as strong": {**LEVEL, "strength": (2.0, 2.0)},
     "slopes to 5 deg": {**LEVEL, "slope_deg": 5.0},
     "slopes to 10 deg": {**LEVEL, "slope_deg": 10.0},
+    "dunes": {**LEVEL, "terrain": "dunes"},
     **{preset: {**LEVEL, "sand": preset} for preset in PRESETS},
     "rigid": {**LEVEL, "ground": "rigid"},
 }
