@@ -10,6 +10,7 @@ import tyro
 from rftsim.cli.costs import compare_speeds, time_environment, time_kernel
 from rftsim.cli.solver import weigh_solver
 from rftsim.cli.stability import play_hard_cases
+from rftsim.cli.terrain import time_terrain
 
 
 @dataclasses.dataclass(frozen=True)
@@ -31,10 +32,12 @@ class Bench:
     solver: the evaluations that the implicit force takes, step by step, and the work that its sand does, in the hard
     cases, the environments and articulated scenes drawn at random, at time steps from 1 to 10 ms.
 
+    terrain: the time that terrain and ruts take over a plane: of the force, of a step, and of 64 simulations at once.
+
     Example: rftsim bench stability --plot out
     """
 
-    study: tyro.conf.Positional[Literal["stability", "kernel", "environment", "pareto", "solver"]]
+    study: tyro.conf.Positional[Literal["stability", "kernel", "environment", "pareto", "solver", "terrain"]]
     """The study to run: what is measured, see above."""
     cases: tuple[str, ...] = ()
     """Names of the hard cases that stability and solver play, of the cases that environment times (wheel, go1), or of
@@ -63,6 +66,8 @@ class Bench:
             time_environment(self.cases, self.quick, self.plot, self.json)
         elif self.study == "pareto":
             compare_speeds(self.cases, self.quick, self.memory, self.plot, self.json)
+        elif self.study == "terrain":
+            time_terrain(self.quick, self.json)
         elif self.study == "solver":
             weigh_solver(self.cases, self.scenes, self.quick, self.memory, self.json)
         else:

@@ -6,18 +6,17 @@ from numba import types
 from rftsim.engine import block, external, names
 from rftsim.engine.refusals import WHY
 from rftsim.law import field as fields
-from rftsim.law.layout import RUTS_NUMBERS, SAND, WRENCH, numbers_in
+from rftsim.law.layout import MOST_SIDE, RUTS_NUMBERS, SAND, WRENCH, numbers_in
 from rftsim.machine import claims
 from rftsim.machine.compiling import exact, inline
 from rftsim.machine.memory import bytes_at, doubles, int32s, int64s, pointer
 from rftsim.machine.records import record_at
-from rftsim.sand.ruts import SIDES
 from rftsim.solver import state
 
 _MEMBER = block.MEMBER.itemsize
 _HEAD = block.BLOCK_HEAD.itemsize
 _COUNTERS = numbers_in(block.COUNTERS)
-MOST_RUTS = RUTS_NUMBERS + 2 * SIDES[1] ** 2
+MOST_RUTS = RUTS_NUMBERS + 2 * MOST_SIDE**2
 _ZERO, _NINE = ord("0"), ord("9")
 SAND_NUMBERS = numbers_in(SAND)
 """Numbers of the record SAND."""

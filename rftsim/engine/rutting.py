@@ -18,7 +18,7 @@ from rftsim.machine.compiling import exact
 from rftsim.machine.memory import doubles, release, stack_doubles, take
 from rftsim.solver.motion import size_of
 
-PART: Final = 0.5
+PART: Final = 1.0
 """How far a body may move before its marks are made [cells]."""
 SLIDING: Final = 0.01
 """Time between two goes at sand that slides [s]."""

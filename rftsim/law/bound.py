@@ -7,10 +7,10 @@ import numpy as np
 from rftsim.law import ruts
 from rftsim.law.field import level_at, normal_of, surface_over
 from rftsim.law.frame import over
+from rftsim.law.layout import PAD
 from rftsim.law.vectors import cross, dot, larger, smaller, to_body, to_world
 from rftsim.machine.compiling import exact, inline, loop
 from rftsim.machine.memory import doubles, peek
-from rftsim.sand.terrain import PAD
 
 NODES: Final = 16384
 """Coefficients below a body that are looked through for it; of more, all its triangles are looked at."""

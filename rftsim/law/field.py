@@ -9,12 +9,11 @@ from collections import namedtuple
 import numpy as np
 
 from rftsim.law import ruts
-from rftsim.law.layout import BED, SAND, TERRAIN, TERRAIN_NUMBERS
+from rftsim.law.layout import BED, PAD, SAND, TERRAIN, TERRAIN_NUMBERS
 from rftsim.law.vectors import larger, smaller
 from rftsim.machine.compiling import inline, inline_loop
 from rftsim.machine.memory import doubles, peek
 from rftsim.machine.records import record_at, values_at
-from rftsim.sand.terrain import PAD
 
 sand_at = record_at(SAND)
 """The addresses of a sand's numbers, at an address."""

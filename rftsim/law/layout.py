@@ -19,7 +19,8 @@ from rftsim.sand import ruts
 from rftsim.sand.free_surface import FreeSurface
 from rftsim.sand.medium import PARAMETERS, Sand
 from rftsim.sand.ruts import Ruts
-from rftsim.sand.terrain import PAD, Terrain
+from rftsim.sand.terrain import PAD as PAD
+from rftsim.sand.terrain import Terrain
 from rftsim.surface.triangles import Array, Surface
 
 TERMS: Final = len(tables.TABLE_C4)
@@ -131,8 +132,10 @@ NO_RIM: Final = 9.0
 
 WRENCH: Final = 6
 """Numbers of a wrench: force, then moment about the body's origin; in memory always in the world frame."""
-GIVEN: Final = repr(BED.descr)
-"""All that machine code of the laws is made from beside its sources: the sand's parameters."""
+MOST_SIDE: Final = ruts.SIDES[1]
+"""Most cells along a side of the window of ruts."""
+GIVEN: Final = repr((BED.descr, PAD, BLOCK_SIDE, MOST_SIDE))
+"""All that machine code of the laws is made from beside its sources: the sand's parameters, sizes of its surface."""
 
 
 def numbers_in(dtype: "np.dtype[Any]") -> int:

@@ -13,8 +13,8 @@ SOLE: Final = 0.05
 """Part of a body's size, from below, whose outline is what presses."""
 NARROWEST: Final = 1.0 / 3.0
 """The narrowest that presses, over the second of a body's three extents: a blade's edge tells nothing of its reach."""
-COARSEST: Final = 1.0 / 12.0
-"""The narrowest that presses, over the size of the largest body: its cells are no finer, whatever they cost."""
+COARSEST: Final = 0.22
+"""The narrowest that presses, over the second extent of the largest body: cells for less would be too many."""
 PRESSING: Final = 0.25
 """Bodies press whose lowest point lies no higher above the lowest of all than this part of the largest body's size."""
 
@@ -37,13 +37,17 @@ def marks_for(data: mujoco.MjData, model: mujoco.MjModel, surfaces: Mapping[str,
     width = min(_width(corners[name]) for name in pressing)
     everything = np.concatenate(list(corners.values()))
     x, y = np.ptp(everything[:, :2], axis=0).tolist()
-    largest = max(surface.size for surface in surfaces.values())
-    return ruts_for(max(width, COARSEST * largest), (x, y))
+    largest = max(surfaces.values(), key=lambda surface: surface.size)
+    return ruts_for(max(width, COARSEST * _second(largest.corners)), (x, y))
 
 
 def _width(points: Array) -> float:
     """The narrower side of what lies lowest of a body's corners, along x and y [m]; points in the world, (n, 3)."""
     size = float(np.ptp(points, axis=0).max())
     sole = points[points[:, 2] <= points[:, 2].min() + SOLE * size]
-    second = float(np.sort(np.ptp(points, axis=0))[1])
-    return max(float(np.ptp(sole[:, :2], axis=0).min()), NARROWEST * second)
+    return max(float(np.ptp(sole[:, :2], axis=0).min()), NARROWEST * _second(points))
+
+
+def _second(points: Array) -> float:
+    """The second of the three extents of points along the axes [m]."""
+    return float(np.sort(np.ptp(points, axis=0))[1])

@@ -179,8 +179,9 @@ def spline(
     """
     rows, columns = np.array(coefficients.shape) - 2 * PAD
     (x0, y0), (dx, dy) = np.asarray(origin), np.asarray(spacing)
-    j, along_x, turn_x = _weights((np.asarray(x, dtype=float) - x0) / dx, int(columns), repeat)
-    i, along_y, turn_y = _weights((np.asarray(y, dtype=float) - y0) / dy, int(rows), repeat)
+    at_x, at_y = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
+    j, along_x, turn_x = _weights((at_x - x0) / dx, int(columns), repeat)
+    i, along_y, turn_y = _weights((at_y - y0) / dy, int(rows), repeat)
     width = coefficients.shape[1]
     first = np.asarray(i * width + j)
     around = np.add.outer(np.arange(3) * width, np.arange(3)).reshape(3, 3, *[1] * first.ndim)

@@ -44,7 +44,8 @@ def frame_of(up, aside):
     """A frame whose plane of motion is upright."""
     up = unit(up)
     plane = unit(cross(up, unit(aside)))
-    return Frame((0.0,) * 3, (0.0,) * 3, up, up, cross(plane, up), 0.0, (0.0,) * 4, 0.0)
+    still, upright = (0.0,) * 3, (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+    return Frame(still, still, up, up, cross(plane, up), 0.0, (0.0,) * 4, 0.0, 0.0, still, upright, (0.0,) * 6)
 
 
 @pytest.mark.parametrize("response", RESPONSES, ids=lambda response: response.reads[0] + str(RESPONSES.index(response)))
