@@ -74,7 +74,7 @@ def test_the_sand_carries_an_ant_that_stands():
     env.reset(seed=0)
     model, data = env.unwrapped.model, env.unwrapped.data
     while data.time < 3.0:
-        if data.time < 1.0:
+        if data.time < 2.0:
             start = data.qpos[:2].copy()
         _, _, terminated, _, info = env.step(np.zeros(8))
         assert not terminated
