@@ -31,8 +31,8 @@ class Recorder:
     the scales, which are those of the whole recording.
 
     Frames stay in memory, some 4 bytes per triangle each, and 2.5 kB for each tile that changed, ten times a second,
-    until `close` writes the file. An error inside the with-block does so too, and being stopped does not: the frames before it show what went
-    wrong. When a reset turns time back, the recording goes on one period after its last frame.
+    until `close` writes the file. An error inside the with-block does so too: the frames before it show what went
+    wrong. Being stopped does not. When a reset turns time back, the recording goes on one period after its last frame.
 
     Args:
         model: A compiled model, with or without sand.
