@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from rftsim.surface.clusters import clustered
 from rftsim.surface.splitting import split
 from rftsim.surface.triangles import Array, Surface
 
@@ -21,14 +22,4 @@ def prints_of(surface: Surface, spacing: float, block: int) -> Array:
     points = np.concatenate([fine.reshape(-1, 3), fine.mean(axis=1)])
     _, first = np.unique(np.rint(points * (FINENESS / spacing)).astype(np.int64), axis=0, return_index=True)
     points = points[np.sort(first)]
-    parts, order = [np.arange(len(points))], []
-    while parts:
-        part = parts.pop()
-        if len(part) <= block:
-            order.append(part)
-            continue
-        axis = int(np.argmax(np.ptp(points[part], axis=0)))
-        part = part[np.argsort(points[part, axis], kind="stable")]
-        middle = block * ((len(part) // 2 + block - 1) // block)
-        parts += [part[middle:], part[:middle]]
-    return points[np.concatenate(order)]
+    return points[clustered(points, block)]

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rftsim.errors import SurfaceError
 from rftsim.files import check_size
+from rftsim.surface.clusters import clustered
 from rftsim.surface.shells import outer, wound
 from rftsim.surface.splitting import split
 from rftsim.surface.topology import Array as Array
@@ -102,17 +103,7 @@ class Surface:
 
     def clustered(self, size: int) -> "Surface":
         """The surface with its triangles in an order where each `size` of them lie close together."""
-        parts, order = [np.arange(self.ntri)], []
-        while parts:
-            part = parts.pop()
-            if len(part) <= size:
-                order.append(part)
-                continue
-            axis = int(np.argmax(np.ptp(self.centres[part], axis=0)))
-            part = part[np.argsort(self.centres[part, axis], kind="stable")]
-            middle = size * ((len(part) // 2 + size - 1) // size)
-            parts += [part[middle:], part[:middle]]
-        return dataclasses.replace(self, triangles=self.triangles[np.concatenate(order)])
+        return dataclasses.replace(self, triangles=self.triangles[clustered(self.centres, size)])
 
     def refined(self, max_edge: float) -> "Surface":
         """The surface with its triangles split until no edge exceeds max_edge [m]."""
