@@ -6,7 +6,7 @@ from numba import types
 from rftsim.engine import block, external, names
 from rftsim.engine.refusals import WHY
 from rftsim.law import field as fields
-from rftsim.law.layout import MOST_SIDE, RUTS_NUMBERS, SAND, WRENCH, numbers_in
+from rftsim.law.layout import MOST_SIDE, RUTS_NUMBERS, SAND, TRACE, TRACE_NUMBERS, WRENCH, numbers_in
 from rftsim.machine import claims
 from rftsim.machine.compiling import exact, inline
 from rftsim.machine.memory import bytes_at, doubles, int32s, int64s, pointer
@@ -31,6 +31,7 @@ is_sound = types.ExternalFunction("rftsim_is_sound", types.intc(types.intp, type
 head = record_at(block.BLOCK_HEAD)
 """The record BLOCK_HEAD of the block at an address."""
 _member_at, _counters_at = record_at(block.MEMBER), record_at(block.COUNTERS)
+_trace_at = record_at(TRACE)
 
 
 @exact
@@ -46,13 +47,19 @@ def count_bodies(model, m, instance):
 
 @exact
 def asked_ruts(model, m, instance):
-    """Numbers of plugin_state that an instance's attribute asks for its ruts; more than MOST_RUTS are none."""
+    """Numbers of plugin_state that an instance's ruts ask for, by its attribute; more than MOST_RUTS are none."""
     end, total = pointer(m + model.npluginattr), 0
     text = bytes_at(pointer(m + model.plugin_attr), end)
     at = int32s(pointer(m + model.plugin_attradr), pointer(m + model.nplugin))[instance]
     while 0 <= at < end and _ZERO <= text[at] <= _NINE and total <= MOST_RUTS:
         total, at = 10 * total + (text[at] - _ZERO), at + 1
-    return total if total <= MOST_RUTS else 0
+    return ruts_of(model, m, instance, total if total <= MOST_RUTS else 0)
+
+
+@exact
+def ruts_of(model, m, instance, of_bed):
+    """Numbers that ruts remember with what they do of an instance's bodies, from the number of the bed's own."""
+    return of_bed + TRACE_NUMBERS * count_bodies(model, m, instance) if of_bed > 0 else 0
 
 
 @exact
@@ -157,6 +164,13 @@ def ruts(address):
     """The address of the ruts of a block, behind the state that lasts, or zero where its bed remembers nothing."""
     known = head(address)
     return known.state + 8 * known.state_size if known.ruts_size > 0 else 0
+
+
+@exact
+def trace(address, k):
+    """What the ruts of a block remember of its k-th body, a record TRACE."""
+    known = head(address)
+    return _trace_at(ruts(address) + 8 * (known.ruts_size - TRACE_NUMBERS * (known.nbody - k)))
 
 
 @exact

@@ -45,7 +45,7 @@ def _check(model, m, number, address):
     if not checks.sensors_fit(model, m, number):
         return WHY.sensor, own
     bed = instance.bed(model, m, address)
-    if head.ruts_size != ruts_size(bed_at(bed)):
+    if head.ruts_size != instance.ruts_of(model, m, number, ruts_size(bed_at(bed))):
         return WHY.state, own
     head.bed_weight = sound.sealed_weight(bed)
     if bed_at(bed).relief != 0.0:

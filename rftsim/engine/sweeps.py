@@ -8,45 +8,85 @@ middle, comes out behind it and at its sides: in a continuum in plane strain a w
 from typing import Final
 
 import numpy as np
+from numba import carray, types
 
-from rftsim.engine import bodies, instance, patch
+from rftsim.engine import bodies, covers, instance, patch
 from rftsim.law import ruts
 from rftsim.law.body import header_at
 from rftsim.law.layout import BLOCK, BOX_NUMBERS, prints_start
-from rftsim.law.vectors import to_world
-from rftsim.machine.compiling import exact, inline
-from rftsim.machine.memory import doubles, peek, stack_doubles
+from rftsim.law.vectors import nine, to_world
+from rftsim.machine.compiling import exact, inline, loop
+from rftsim.machine.memory import doubles, on_stack, peek, poke, stack_doubles
 
 RINGS: Final = 3
 """Rings of cells about one in which the nearest that no body holds is looked for first."""
 ACROSS: Final = 0.5
 """Share of a surface's speed along the level from which on it pushes the sand ahead by a cell."""
+_found = on_stack(3 * BLOCK, types.float64)
+
+
+@loop
+def _place_prints(prints, first, n, count, r, at, per, out):
+    """Fill out with the height [m], the row and the column of each of count prints from one of n on, column by column.
+
+    Args:
+        prints: Their places, body frame [m], three columns of n.
+        first: The first of them.
+        n: How many there are in all.
+        count: How many to look at, at most BLOCK.
+        r: Body to world, row-major, (9,).
+        at: Position of the body's origin [m], (3,).
+        per: Cells per metre.
+        out: (3 BLOCK,).
+    """
+    for i in range(count):
+        x, y, z = peek(prints, first + i), peek(prints, first + i + n), peek(prints, first + i + 2 * n)
+        poke(out, i, at[2] + r[6] * x + r[7] * y + r[8] * z)
+        poke(out, i + BLOCK, np.floor((at[1] + r[3] * x + r[4] * y + r[5] * z) * per + 0.5))
+        poke(out, i + 2 * BLOCK, np.floor((at[0] + r[0] * x + r[1] * y + r[2] * z) * per + 0.5))
+
+
+@exact
+def _is_over(p, marks, box, top):
+    """Whether a box in the world, by its centre and half its size [m], (6,), comes below a height over the patch."""
+    head, x = patch.head(p), marks.spacing
+    is_in = box[1] + box[4] >= (head.row - 0.5) * x and box[1] - box[4] <= (head.row + head.rows - 0.5) * x
+    is_in = is_in and box[0] + box[3] >= (head.column - 0.5) * x
+    return is_in and box[0] - box[3] <= (head.column + head.columns - 0.5) * x and box[2] - box[5] <= top
 
 
 @exact
 def press(p, t, marks, top, body, k, surface):
     """Note the lowest points of the k-th body of a bed over the cells of the patch, of those below a height [m]."""
-    header, r = header_at(surface), t.xmat[9 * body : 9 * body + 9]
-    n, at = int(header.prints), t.xpos[3 * body : 3 * body + 3]
-    numbers = doubles(surface + 8 * prints_start(header), 3 * n + BOX_NUMBERS * ((n + BLOCK - 1) // BLOCK))
-    lowest, mover, rows, columns = patch.lowest(p), patch.mover(p), patch.head(p).rows, patch.head(p).columns
-    for start in range(0, n, BLOCK):
-        box = 3 * n + BOX_NUMBERS * (start // BLOCK)
-        _, _, middle = to_world(r, peek(numbers, box), peek(numbers, box + 1), peek(numbers, box + 2))
-        half = (
-            abs(r[6]) * peek(numbers, box + 3) + abs(r[7]) * peek(numbers, box + 4) + abs(r[8]) * peek(numbers, box + 5)
-        )
-        if not at[2] + middle - half <= top:
-            continue
-        for i in range(start, min(start + BLOCK, n)):
-            x, y, z = peek(numbers, i), peek(numbers, i + n), peek(numbers, i + 2 * n)
-            low = at[2] + r[6] * x + r[7] * y + r[8] * z
-            if not low <= top:
-                continue
-            row = ruts.cell(at[1] + r[3] * x + r[4] * y + r[5] * z, marks.spacing) - patch.head(p).row
-            column = ruts.cell(at[0] + r[0] * x + r[1] * y + r[2] * z, marks.spacing) - patch.head(p).column
-            if 0 <= row < rows and 0 <= column < columns and low < lowest[row, column]:
-                lowest[row, column], mover[row, column] = low, k
+    header, matrix, position = header_at(surface), t.xmat[9 * body : 9 * body + 9], t.xpos[3 * body : 3 * body + 3]
+    box, found = doubles(stack_doubles(6), 6), carray(_found(), (3 * BLOCK,))
+    covers.extent(t, body, surface, box)
+    if not _is_over(p, marks, box, top):
+        return
+    n, r, at = int(header.prints), nine(matrix), (position[0], position[1], position[2])
+    count = (n + BLOCK - 1) // BLOCK
+    numbers = doubles(surface + 8 * prints_start(header), 3 * n + BOX_NUMBERS * count)
+    for block in range(count):
+        start = 3 * n + BOX_NUMBERS * block
+        covers.place_box(r, at, numbers[start : start + BOX_NUMBERS], box)
+        if _is_over(p, marks, box, top):
+            some = min(BLOCK, n - BLOCK * block)
+            _place_prints(numbers, BLOCK * block, n, some, r, at, 1.0 / marks.spacing, found)
+            _note(p, found, some, k)
+
+
+@exact
+def _note(p, found, count, k):
+    """Note the heights of so many points of the k-th body, see `_place_prints`."""
+    lowest, mover, head = patch.flat(p, patch.lowest(p)), patch.flat(p, patch.mover(p)), patch.head(p)
+    rows, columns = float(head.rows), float(head.columns)
+    for i in range(count):
+        row, column = peek(found, i + BLOCK) - head.row, peek(found, i + 2 * BLOCK) - head.column
+        if 0.0 <= row < rows and 0.0 <= column < columns:
+            cell = int(row) * head.columns + int(column)
+            if peek(found, i) < peek(lowest, cell):
+                poke(lowest, cell, peek(found, i))
+                poke(mover, cell, float(k))
 
 
 @exact

@@ -8,9 +8,10 @@ from rftsim.law import ruts
 from rftsim.law.field import level_at, normal_of, surface_over
 from rftsim.law.frame import over
 from rftsim.law.layout import PAD
+from rftsim.law.spline import values_of, width_of
 from rftsim.law.vectors import cross, dot, larger, smaller, to_body, to_world
 from rftsim.machine.compiling import exact, inline, loop
-from rftsim.machine.memory import doubles, peek
+from rftsim.machine.memory import peek
 
 NODES: Final = 16384
 """Coefficients below a body that are looked through for it; of more, all its triangles are looked at."""
@@ -59,7 +60,7 @@ def _most_above(field, middle, half, tangent):
     No point of a surface of B-splines is above all its coefficients, and of a plane they lie on it.
     """
     grid, level = field.grid, field.level
-    if field.first == 0:
+    if grid.first == 0:
         return 0.0
     first_column = np.floor((middle[0] - half[0] - grid.x) * grid.per_x - 1.5)
     first_row = np.floor((middle[1] - half[1] - grid.y) * grid.per_y - 1.5)
@@ -67,13 +68,13 @@ def _most_above(field, middle, half, tangent):
     rows = np.ceil((middle[1] + half[1] - grid.y) * grid.per_y + 1.5) - first_row + 1.0
     if not rows * columns <= NODES:
         return np.inf
-    values, along, across = doubles(field.first, grid.size), tangent[0] - level.along, tangent[1] - level.across
+    values, along, across = values_of(grid), tangent[0] - level.along, tangent[1] - level.across
     beside, step = level_at(field, middle[0], middle[1]) - tangent[2], along / grid.per_x
     is_whole = first_column >= -PAD and first_column + columns <= grid.columns + PAD
     most, x = -np.inf, grid.x + first_column / grid.per_x - middle[0]
     for k in range(int(rows)):
         row = first_row + k
-        start = int(grid.width) * _index(row, grid.rows, grid.per_row)
+        start = int(width_of(grid)) * _index(row, grid.rows, grid.per_row)
         at = beside - across * (grid.y + row / grid.per_y - middle[1]) - along * x
         if is_whole:
             most = max(most, at + _most_in_row(values, start + int(first_column) + PAD, int(columns), step))

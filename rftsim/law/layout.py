@@ -48,15 +48,17 @@ SAND: Final = np.dtype([("bed", "i8"), ("terrain", "i8"), ("ruts", "i8")])
 """What compiled code is told of a sand: addresses, of its BED, and of a TERRAIN and of RUTS, zero where it has none."""
 RUTS: Final = np.dtype(
     [
-        *((name, "f8") for name in ("row", "column", "travel", "clock", "moved", "left")),
-        ("unsettled", "f8", 4),
+        *((name, "f8") for name in ("row", "column", "clock", "moved", "left")),
     ]
 )
 """The head of the ruts that a simulation remembers, all zero where there are none: row and column of the window's first
-cell, counted from the world's origin; the farthest that a body has moved [m] and the time [s] since they were looked
-at; volume that was displaced and that was left behind the window [m^3]; first row and column of what still slides, and
-those behind it. Then for each cell the height over the free surface [m], and for each block of BLOCK_SIDE x BLOCK_SIDE
-their mean. A cell's place is its row and column modulo those of the window."""
+cell, counted from the world's origin; the time since sand slid [s]; volume that was displaced and that was left behind
+the window [m^3]. Then for each cell the height over the free surface [m], whose place is its row and column modulo
+those of the window; for each block of BLOCK_SIDE x BLOCK_SIDE their mean, with PAD zeros around all; and for each body
+a record of TRACE."""
+TRACE: Final = np.dtype([("travel", "f8"), ("rising", "f8"), ("unsettled", "f8", 4)])
+"""What the ruts remember of a body: the way that it has gone since its marks were made [m]; whether it rises (0 or 1);
+first row and column of what still slides about it, and those behind it."""
 BLOCK_SIDE: Final = ruts.BLOCK
 TERRAIN: Final = np.dtype(
     [(name, "f8") for name in ("rows", "columns", "x", "y", "dx", "dy", "repeat")],
@@ -265,6 +267,7 @@ def _boxes(points: Array) -> Array:
 BED_NUMBERS: Final = numbers_in(BED)
 TERRAIN_NUMBERS: Final = numbers_in(TERRAIN)
 RUTS_NUMBERS: Final = numbers_in(RUTS)
+TRACE_NUMBERS: Final = numbers_in(TRACE)
 HEADER_NUMBERS: Final = numbers_in(HEADER)
 BOX_NUMBERS: Final = numbers_in(BOX)
 COLUMNS: Final = len(COLUMN)
@@ -293,9 +296,10 @@ def packed_size(header: Any) -> Any:
 
 @exact_kernel
 def ruts_size(bed: Any) -> Any:
-    """The number of numbers that a simulation remembers of a bed's ruts."""
-    cells = int(bed.rows) * int(bed.columns)
-    return 0 if cells == 0 else RUTS_NUMBERS + cells + cells // (BLOCK_SIDE * BLOCK_SIDE)
+    """The number of numbers that a simulation remembers of a bed's ruts, beside what it does of bodies."""
+    rows, columns = int(bed.rows), int(bed.columns)
+    blocks = (rows // BLOCK_SIDE + 2 * PAD) * (columns // BLOCK_SIDE + 2 * PAD)
+    return 0 if rows * columns == 0 else RUTS_NUMBERS + rows * columns + blocks
 
 
 def read_columns(packed: Array) -> tuple[Array, ...]:

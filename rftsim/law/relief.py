@@ -8,12 +8,13 @@ from typing import Final
 from numba import carray, types
 
 from rftsim.law import ruts
-from rftsim.law.field import level_at, next_three, normal_of, spline, start_of, surface_over
+from rftsim.law.field import level_at, normal_of, surface_over
 from rftsim.law.frame import over
 from rftsim.law.layout import COLUMN, COLUMNS
+from rftsim.law.spline import nine_from, spline, start_of, values_of, width_of
 from rftsim.law.vectors import cross, smaller, to_body, to_world
 from rftsim.machine.compiling import inline, inline_loop
-from rftsim.machine.memory import doubles, on_stack, peek, poke
+from rftsim.machine.memory import on_stack, peek, poke
 
 TILE: Final = 32
 """Faces that are looked for together in a terrain."""
@@ -21,7 +22,8 @@ ABOUT: Final = 12
 """Numbers that are kept meanwhile of each: the first coefficient's place, two distances, and nine coefficients."""
 _scratch = on_stack(ABOUT * TILE, types.float64)
 FOUND: Final = COLUMNS
-"""First of four columns of a face where what is found is kept: depth, and the normal of the surface."""
+"""First of four columns of a face where what is found is kept: depth, and the normal of the surface. Meanwhile, where
+there are ruts: height of the surface [m], its slopes along x and y [-], and how much the face bears."""
 
 
 @inline
@@ -98,26 +100,24 @@ def settle(chosen, stride, n, frame, field):
     In loops one behind another, of which the compiler takes all but those that look into a grid for several faces at
     once.
     """
-    scratch = carray(_scratch(), (TILE * ABOUT,))
+    scratch, grid = carray(_scratch(), (TILE * ABOUT,)), field.grid
     for first in range(0, n, TILE):
         some = min(TILE, n - first)
-        is_one = field.first != 0 and _find(scratch, chosen, stride, first, some, frame, field)
-        if field.first != 0 and not (is_one and field.marks.rows == 0):
-            _gather(scratch, some, field)
         if field.marks.rows != 0:
             _settle_rutted(scratch, chosen, stride, first, some, frame, field)
-        elif is_one:
+        elif _find(scratch, chosen, stride, first, some, frame, grid):
             _settle_one(scratch, chosen, stride, first, some, frame, field)
         else:
+            _gather(scratch, some, grid)
             _settle_smooth(scratch, chosen, stride, first, some, frame, field)
 
 
 @inline_loop
-def _find(scratch, chosen, stride, start, n, frame, field):
-    """Write where n faces from one on lie in the grid into a scratch; whether all have the same nine coefficients."""
+def _find(scratch, chosen, stride, start, n, frame, grid):
+    """Write where n faces from one on lie in a grid into a scratch; whether all have the same nine coefficients."""
     for i in range(n):
         x, y, _ = _in_world(frame, _three(chosen, stride, start + i, COLUMN.x))
-        k, f, g = start_of(field.grid, x, y)
+        k, f, g = start_of(grid, x, y)
         poke(scratch, i, k)
         poke(scratch, i + TILE, f)
         poke(scratch, i + 2 * TILE, g)
@@ -128,65 +128,102 @@ def _find(scratch, chosen, stride, start, n, frame, field):
 
 
 @inline_loop
-def _gather(scratch, n, field):
+def _gather(scratch, n, grid):
     """Copy the coefficients about each of n faces into the scratch."""
-    values, width = doubles(field.first, field.grid.size), int(field.grid.width)
+    values, width = values_of(grid), int(width_of(grid))
     for i in range(n):
-        k = int(peek(scratch, i))
+        rows = nine_from(values, int(peek(scratch, i)), width)
         for row in range(3):
-            a, b, c = next_three(values, k + row * width)
-            at = i + (3 + 3 * row) * TILE
-            poke(scratch, at, a)
-            poke(scratch, at + TILE, b)
-            poke(scratch, at + 2 * TILE, c)
+            _poke_three(scratch, TILE, i, 3 + 3 * row, rows[row])
 
 
 @inline_loop
-def _over_found(scratch, i, rows, field):
-    """Height of the terrain over the i-th face [m], and slopes [-], from coefficients."""
-    f, g = peek(scratch, i + TILE), peek(scratch, i + 2 * TILE)
-    height, along, across = spline(field.grid, rows[0], rows[1], rows[2], f, g)
-    return height + field.level.height, along, across
+def _over_found(scratch, i, rows, grid):
+    """Height over the i-th face [m], and slopes [-], from coefficients."""
+    return spline(grid, rows, peek(scratch, i + TILE), peek(scratch, i + 2 * TILE))
+
+
+@inline_loop
+def _gathered(scratch, i):
+    """The coefficients of the i-th face."""
+    return _three(scratch, TILE, i, 3), _three(scratch, TILE, i, 6), _three(scratch, TILE, i, 9)
 
 
 @inline_loop
 def _settle_one(scratch, chosen, stride, start, n, frame, field):
     """Find depth and normal for n faces from one on that have the same coefficients; there are no ruts."""
-    values, width, k = doubles(field.first, field.grid.size), int(field.grid.width), int(peek(scratch, 0))
-    rows = next_three(values, k), next_three(values, k + width), next_three(values, k + 2 * width)
+    grid = field.grid
+    rows = nine_from(values_of(grid), int(peek(scratch, 0)), int(width_of(grid)))
     for i in range(n):
-        centre = _three(chosen, stride, start + i, COLUMN.x)
-        z = _in_world(frame, centre)[2]
-        deep, nx, ny, nz = _felt(field, frame, centre, z, _over_found(scratch, i, rows, field), 1.0)
-        _keep(chosen, stride, start + i, deep, nx, ny, nz)
+        _settle_face(chosen, stride, start + i, _over_found(scratch, i, rows, grid), frame, field)
 
 
 @inline_loop
 def _settle_smooth(scratch, chosen, stride, start, n, frame, field):
     """The same of faces whose coefficients have been gathered."""
     for i in range(n):
-        centre = _three(chosen, stride, start + i, COLUMN.x)
-        z = _in_world(frame, centre)[2]
-        rows = _three(scratch, TILE, i, 3), _three(scratch, TILE, i, 6), _three(scratch, TILE, i, 9)
-        deep, nx, ny, nz = _felt(field, frame, centre, z, _over_found(scratch, i, rows, field), 1.0)
-        _keep(chosen, stride, start + i, deep, nx, ny, nz)
+        above = _over_found(scratch, i, _gathered(scratch, i), field.grid)
+        _settle_face(chosen, stride, start + i, above, frame, field)
+
+
+@inline_loop
+def _settle_face(chosen, stride, i, above, frame, field):
+    """Keep depth and normal of the i-th face, from height [m] and slopes [-] of the terrain above it."""
+    centre, (height, along, across) = _three(chosen, stride, i, COLUMN.x), above
+    above = height + field.level.height, along, across
+    _keep(chosen, stride, i, _felt(field, frame, centre, _in_world(frame, centre)[2], above, 1.0))
 
 
 @inline_loop
 def _settle_rutted(scratch, chosen, stride, start, n, frame, field):
-    """The same where there are ruts."""
+    """Find depth and normal for n faces from one on where there are ruts."""
+    for i in range(start, start + n):
+        x, y, _ = _in_world(frame, _three(chosen, stride, i, COLUMN.x))
+        _keep(chosen, stride, i, (level_at(field, x, y), field.level.along, field.level.across, 1.0))
+    if field.grid.first != 0:
+        _add_over(scratch, chosen, stride, start, n, frame, field.grid)
+    _bear(scratch, chosen, stride, start, n, frame, field.marks)
+    _add_over(scratch, chosen, stride, start, n, frame, field.marks.blocks)
+    for i in range(start, start + n):
+        centre, above = _three(chosen, stride, i, COLUMN.x), _three(chosen, stride, i, FOUND)
+        share = peek(chosen, i + (FOUND + 3) * stride)
+        _keep(chosen, stride, i, _felt(field, frame, centre, _in_world(frame, centre)[2], above, share))
+
+
+@inline_loop
+def _add_over(scratch, chosen, stride, start, n, frame, grid):
+    """Add what a grid adds to the height and slopes of the surface above n faces from one on."""
+    _find(scratch, chosen, stride, start, n, frame, grid)
+    _gather(scratch, n, grid)
     for i in range(n):
-        centre = _three(chosen, stride, start + i, COLUMN.x)
-        x, y, z = _in_world(frame, centre)
-        above = level_at(field, x, y), field.level.along, field.level.across
-        if field.first != 0:
-            rows = _three(scratch, TILE, i, 3), _three(scratch, TILE, i, 6), _three(scratch, TILE, i, 9)
-            above = _over_found(scratch, i, rows, field)
-        n_hat = _three(chosen, stride, start + i, COLUMN.nx)
-        n_hat = to_world(frame.turn, n_hat[0], n_hat[1], n_hat[2])
-        share, h, along, across = _rutted(field, n_hat, (x, y, z), above)
-        deep, nx, ny, nz = _felt(field, frame, centre, z, (h, along, across), share)
-        _keep(chosen, stride, start + i, deep, nx, ny, nz)
+        at, (height, along, across) = start + i, _over_found(scratch, i, _gathered(scratch, i), grid)
+        h, a, b = _three(chosen, stride, at, FOUND)
+        _poke_three(chosen, stride, at, FOUND, (h + height, a + along, b + across))
+
+
+@inline_loop
+def _bear(scratch, chosen, stride, start, n, frame, marks):
+    """Keep how much n faces from one on bear, see `ruts`; kept is the height of the surface without ruts."""
+    for i in range(n):
+        x, y, _ = _in_world(frame, _three(chosen, stride, start + i, COLUMN.x))
+        normal = _three(chosen, stride, start + i, COLUMN.nx)
+        nx, ny, _ = to_world(frame.turn, normal[0], normal[1], normal[2])
+        ahead = ruts.BEFORE * marks.spacing
+        row, g, is_in = ruts.along(y + ahead * ny, marks.spacing, marks.row, marks.rows)
+        column, f, is_beside = ruts.along(x + ahead * nx, marks.spacing, marks.column, marks.columns)
+        _poke_three(scratch, TILE, i, 0, (row, column, is_in * is_beside))
+        poke(scratch, i + 3 * TILE, f)
+        poke(scratch, i + 4 * TILE, g)
+    for i in range(n):
+        a, b, c, d = ruts.four_cells(marks, int(peek(scratch, i)), int(peek(scratch, i + TILE)))
+        _poke_three(scratch, TILE, i, 5, (a, b, c))
+        poke(scratch, i + 8 * TILE, d)
+    for i in range(n):
+        at, four = start + i, (*_three(scratch, TILE, i, 5), peek(scratch, i + 8 * TILE))
+        left = ruts.between(four, peek(scratch, i + 3 * TILE), peek(scratch, i + 4 * TILE))
+        _, _, z = _in_world(frame, _three(chosen, stride, at, COLUMN.x))
+        above = z - peek(chosen, at + FOUND * stride) - peek(scratch, i + 2 * TILE) * left
+        poke(chosen, at + (FOUND + 3) * stride, ruts.reaches(marks, above))
 
 
 @inline
@@ -197,13 +234,19 @@ def _three(chosen, stride, i, column):
 
 
 @inline
-def _keep(chosen, stride, i, a, b, c, d):
+def _poke_three(array, stride, i, column, numbers):
+    """Write numbers of the i-th face in three columns from one on."""
+    at = i + column * stride
+    poke(array, at, numbers[0])
+    poke(array, at + stride, numbers[1])
+    poke(array, at + 2 * stride, numbers[2])
+
+
+@inline
+def _keep(chosen, stride, i, found):
     """Write four numbers of the i-th face behind its columns."""
-    at = i + FOUND * stride
-    poke(chosen, at, a)
-    poke(chosen, at + stride, b)
-    poke(chosen, at + 2 * stride, c)
-    poke(chosen, at + 3 * stride, d)
+    _poke_three(chosen, stride, i, FOUND, found)
+    poke(chosen, i + (FOUND + 3) * stride, found[3])
 
 
 @inline

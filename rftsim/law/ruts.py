@@ -12,9 +12,10 @@ from typing import Final
 
 import numpy as np
 
-from rftsim.law.layout import BED, BLOCK_SIDE, RUTS, RUTS_NUMBERS
+from rftsim.law.layout import BED, BLOCK_SIDE, PAD, RUTS, RUTS_NUMBERS
+from rftsim.law.spline import Grid, no_grid, spline_over, values_of, width_of
 from rftsim.law.vectors import larger, smaller
-from rftsim.machine.compiling import exact, inline
+from rftsim.machine.compiling import exact, inline, inline_loop
 from rftsim.machine.memory import doubles, peek
 from rftsim.machine.records import record_at, values_at
 
@@ -30,9 +31,8 @@ ruts_at = record_at(RUTS)
 _Cells = namedtuple("_Cells", ["spacing", "rows", "columns"])
 _cells_at = values_at(BED, _Cells)
 Marks = namedtuple("Marks", ["spacing", "rows", "columns", "row", "column", "cells", "blocks"])
-Marks.__doc__ = (
-    """Ruts in memory: side of a cell [m]; how many, int64; the first ones; addresses of cells and blocks."""
-)
+Marks.__doc__ = """Ruts in memory: side of a cell [m]; how many, int64; the first ones; the address of the cells; the grid
+of the blocks' means, whose padding is zero."""
 
 
 @inline
@@ -40,25 +40,19 @@ def marks_of(bed, ruts):
     """The ruts at an address, of the bed at another; of no cells where the address is zero."""
     size = _cells_at(bed)
     if ruts == 0:
-        return Marks(1.0, 0, 0, 0, 0, 0, 0)
+        return Marks(1.0, 0, 0, 0, 0, 0, no_grid())
     head, rows, columns = ruts_at(ruts), int(size.rows), int(size.columns)
-    cells = ruts + 8 * RUTS_NUMBERS
-    return Marks(
-        size.spacing, rows, columns, int(head.row), int(head.column), cells, cells + 8 * rows * columns
-    )  # fmt: skip
+    row, column, cells = int(head.row), int(head.column), ruts + 8 * RUTS_NUMBERS
+    x, y = (column + MIDDLE) * size.spacing, (row + MIDDLE) * size.spacing
+    per, first = 1.0 / (BLOCK_SIDE * size.spacing), cells + 8 * rows * columns
+    blocks = Grid(first, size.rows / BLOCK_SIDE, size.columns / BLOCK_SIDE, x, y, per, per, 0.0, 0.0)
+    return Marks(size.spacing, rows, columns, row, column, cells, blocks)
 
 
 @inline
 def place_of(marks, row, column):
     """Where a cell that lies in the window is kept."""
     return (row & (marks.rows - 1)) * marks.columns + (column & (marks.columns - 1))
-
-
-@inline
-def _is_inside(marks, row, column, more):
-    """Whether a cell lies in the window, and so many beyond it."""
-    r, c = row - marks.row, column - marks.column
-    return (r >= 0) & (c >= 0) & (r + more < marks.rows) & (c + more < marks.columns)
 
 
 @inline
@@ -73,55 +67,53 @@ def cell(x, spacing):
     return _whole(x / spacing + 0.5)
 
 
+@inline_loop
+def along(x, spacing, first, count):
+    """Of a coordinate [m], along an axis with so many cells from one on: the nearest pair of cells in the window.
+
+    Returns:
+        The first of both, how far the coordinate lies beyond it [cells], and whether it lies between them (0 or 1).
+    """
+    u = x / spacing - first
+    low = smaller(larger(0.0, np.floor(u)), count - 2.0)  # what is no number becomes one
+    return low + first, u - low, 1.0 if (u >= low) & (u < low + 1.0) else 0.0
+
+
 @inline
-def height(marks, x, y):
-    """Height of the sand over the free surface at a place [m], between cells in proportion; none out of the window."""
-    u, v = x / marks.spacing, y / marks.spacing
-    column, row = _whole(u), _whole(v)
-    if not _is_inside(marks, row, column, 1):
-        return 0.0
-    values, f, g = doubles(marks.cells, marks.rows * marks.columns), u - column, v - row
+def four_cells(marks, row, column):
+    """Heights over the free surface of a cell and of the next ones, along rows first [m], (4,)."""
+    values = doubles(marks.cells, marks.rows * marks.columns)
     a, b = peek(values, place_of(marks, row, column)), peek(values, place_of(marks, row, column + 1))
     c, d = peek(values, place_of(marks, row + 1, column)), peek(values, place_of(marks, row + 1, column + 1))
+    return a, b, c, d
+
+
+@inline_loop
+def between(four, f, g):
+    """Height between four cells [m], so far from the first along columns and rows [cells], in proportion."""
+    a, b, c, d = four
     return (1.0 - g) * ((1.0 - f) * a + f * b) + g * ((1.0 - f) * c + f * d)
 
 
 @inline
-def block_place(marks, row, column):
-    """Where the mean of a block that lies in the window is kept."""
-    rows, columns = marks.rows // BLOCK_SIDE, marks.columns // BLOCK_SIDE
-    return (row & (rows - 1)) * columns + (column & (columns - 1))
+def height(marks, x, y):
+    """Height of the sand over the free surface at a place [m], between cells in proportion; none out of the window."""
+    row, g, is_in = along(y, marks.spacing, marks.row, marks.rows)
+    column, f, is_beside = along(x, marks.spacing, marks.column, marks.columns)
+    return is_in * is_beside * between(four_cells(marks, int(row), int(column)), f, g) if marks.rows != 0 else 0.0
 
 
 @inline
-def _block(marks, row, column):
-    """Mean height of a block over the free surface [m]; none out of the window."""
-    rows, columns = marks.rows // BLOCK_SIDE, marks.columns // BLOCK_SIDE
-    r, c = row - marks.row // BLOCK_SIDE, column - marks.column // BLOCK_SIDE
-    if (r < 0) | (c < 0) | (r >= rows) | (c >= columns):
-        return 0.0
-    values = doubles(marks.blocks, rows * columns)
-    return peek(values, block_place(marks, row, column))
+def block_place(marks, row, column):
+    """Where the mean of the block of a cell that lies in the window is kept."""
+    across, along = (row - marks.row) // BLOCK_SIDE, (column - marks.column) // BLOCK_SIDE
+    return (across + PAD) * int(width_of(marks.blocks)) + along + PAD
 
 
 @inline
 def level(marks, x, y):
     """Mean level of the sand about a place over the free surface [m], and its slopes along x and y [-]."""
-    side = BLOCK_SIDE * marks.spacing
-    u, v = (x / marks.spacing - MIDDLE) / BLOCK_SIDE, (y / marks.spacing - MIDDLE) / BLOCK_SIDE
-    column, row = _whole(u + 0.5), _whole(v + 0.5)
-    f, g = u - column, v - row
-    a = 0.5 * (0.5 - f) * (0.5 - f), 0.75 - f * f, 0.5 * (0.5 + f) * (0.5 + f)
-    b = 0.5 * (0.5 - g) * (0.5 - g), 0.75 - g * g, 0.5 * (0.5 + g) * (0.5 + g)
-    da, db = (f - 0.5, -2.0 * f, f + 0.5), (g - 0.5, -2.0 * g, g + 0.5)
-    h = along = across = 0.0
-    for i in range(3):
-        for j in range(3):
-            c = _block(marks, row + i - 1, column + j - 1)
-            h += b[i] * a[j] * c
-            along += b[i] * da[j] * c
-            across += db[i] * a[j] * c
-    return h, along / side, across / side
+    return spline_over(marks.blocks, x, y)
 
 
 @exact
@@ -137,18 +129,16 @@ def highest_level(marks, x, y, wide, long):
     """
     if marks.rows == 0:
         return 0.0
-    side = BLOCK_SIDE * marks.spacing
-    rows, columns = marks.rows // BLOCK_SIDE, marks.columns // BLOCK_SIDE
-    first_row, first_column = marks.row // BLOCK_SIDE, marks.column // BLOCK_SIDE
-    low = max(_whole((y - long) / side - 2.0), first_row), max(_whole((x - wide) / side - 2.0), first_column)
-    high = (
-        min(_whole((y + long) / side + 3.0), first_row + rows),
-        min(_whole((x + wide) / side + 3.0), first_column + columns),
+    grid, side, most = marks.blocks, BLOCK_SIDE * marks.spacing, 0.0
+    values, width = values_of(grid), int(width_of(grid))
+    first = max(_whole((y - long - grid.y) / side - 0.5), 0), max(_whole((x - wide - grid.x) / side - 0.5), 0)
+    last = (
+        min(_whole((y + long - grid.y) / side + 1.5), marks.rows // BLOCK_SIDE - 1),
+        min(_whole((x + wide - grid.x) / side + 1.5), marks.columns // BLOCK_SIDE - 1),
     )
-    most = 0.0
-    for row in range(low[0], high[0]):
-        for column in range(low[1], high[1]):
-            most = max(most, _block(marks, row, column))
+    for row in range(first[0], last[0] + 1):
+        for column in range(first[1], last[1] + 1):
+            most = max(most, peek(values, (row + PAD) * width + column + PAD))
     return most
 
 

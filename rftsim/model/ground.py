@@ -156,5 +156,5 @@ def ground(model: mujoco.MjModel, data: mujoco.MjData | None = None, bed: str | 
     size = int(layout.ruts_size(own.bed))
     if data is None or not size:
         return Ground(own, np.zeros(0))
-    end = int(model.plugin_stateadr[own.id] + model.plugin_statenum[own.id])
+    end = int(model.plugin_stateadr[own.id] + model.plugin_statenum[own.id]) - layout.TRACE_NUMBERS * len(own.bodies)
     return Ground(own, data.plugin_state[end - size : end].copy())
