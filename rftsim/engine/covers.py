@@ -43,20 +43,20 @@ def join(box, other):
 
 
 @exact
-def meet(box, other, margin):
-    """Whether two boxes that hold cells come nearer to one another than so many cells."""
-    apart = box[0] >= other[2] + margin or other[0] >= box[2] + margin
-    beside = box[1] >= other[3] + margin or other[1] >= box[3] + margin
+def meet(box, other):
+    """Whether two boxes have cells in common."""
+    apart = box[0] >= other[2] or other[0] >= box[2]
+    beside = box[1] >= other[3] or other[1] >= box[3]
     return not (apart or beside or is_empty(box) or is_empty(other))
 
 
 @exact
-def merge(boxes, margin):
-    """Join those of many boxes, (n, 4), that come nearer to one another than so many cells, in the first of them."""
+def merge(boxes):
+    """Join those of many boxes, (n, 4), that have cells in common, in the first of them."""
     k = 0
     while k < len(boxes):
         for other in range(len(boxes)):
-            if other != k and meet(boxes[k], boxes[other], margin):
+            if other != k and meet(boxes[k], boxes[other]):
                 join(boxes[k], boxes[other])
                 empty(boxes[other])
                 k = -1

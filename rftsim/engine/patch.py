@@ -13,9 +13,8 @@ from rftsim.machine.compiling import exact, inline, loop
 from rftsim.machine.memory import doubles, peek, poke
 from rftsim.machine.table import Table
 
-TABLE_HEAD: Final = np.dtype([(name, "i8") for name in ("rows", "columns", "row", "column", "has_targets")])
-"""The head of a patch: how many rows and columns of cells it has, and the first of each, counted from the origin;
-whether targets were found (0 or 1)."""
+TABLE_HEAD: Final = np.dtype([(name, "i8") for name in ("rows", "columns", "row", "column")])
+"""The head of a patch: how many rows and columns of cells it has, and the first of each, counted from the origin."""
 _T: Final = Table(TABLE_HEAD, ("rows", "columns"))
 head = _T.head
 """Record TABLE_HEAD of the patch at p."""
@@ -25,13 +24,13 @@ lowest = _T.matrix("rows", "columns")
 """Lowest point of a body over each cell, world frame [m], (rows, columns); infinite where there is none."""
 mover = _T.matrix("rows", "columns")
 """Which body that is, by its place in the bed, (rows, columns)."""
-target = _T.matrix("rows", "columns")
-"""The nearest cell that no body holds, by its place in the patch, where that was asked for, (rows, columns)."""
 level = _T.matrix("rows", "columns")
 """Heights of the cells between which sand can slide [m], no numbers for others, (rows, columns)."""
 flow = _T.matrix("rows", "columns")
 """How much the sand of a cell rises [m], (rows, columns)."""
 lay_out, place = _T.layout(), _T.place()
+DIAGONAL: Final = 2.0**0.5
+"""Distance to a neighbour across a corner [cells]."""
 TABLE: Final = _T.size
 """Numbers of a patch's table."""
 
@@ -50,11 +49,10 @@ def _fill_run(heights, start, count, field, x, y, spacing, values, place):
 
 @exact
 def fill(p, field, marks):
-    """Fill the heights of a patch's cells, and no body over them, and no targets; the highest [m]."""
+    """Fill the heights of a patch's cells, and no body over them; the highest [m]."""
     table, heights, bodies, top = head(p), flat(p, height(p)), flat(p, lowest(p)), -np.inf
     values, x, rows, columns = doubles(marks.cells, marks.rows * marks.columns), marks.spacing, table.rows, table.columns
     first = min(columns, marks.columns - (table.column & (marks.columns - 1)))  # behind it they go on from the start
-    table.has_targets = 0
     for i in range(rows):
         row = table.row + i
         for start, end in ((0, first), (first, columns)):

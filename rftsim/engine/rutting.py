@@ -118,21 +118,20 @@ def _lay_out(p, marks, box):
 
 
 @exact
-def _work(model, m, t, address, field, marks, box, repose):
+def _work(model, m, t, address, field, marks, box, repose, passed):
     """Mark and slide in a box of cells, which becomes that of what still slides; the volume displaced [m^3]."""
     p = stack_doubles(_TABLE)
     size = _lay_out(p, marks, box)
     memory = take(size) if size > 0 else 0
-    covers.empty(box)
     if memory == 0:
+        covers.empty(box)
         return 0.0
     patch.place(p, memory)
     top = patch.fill(p, field, marks)
     for k in range(instance.head(address).nbody):
         sweeps.press(p, t, marks, top, instance.body(address, k), k, instance.surface(model, m, address, k))
-    moved = sweeps.lower(model, m, t, address, p, marks, repose)
-    slid, first = slides.settle(p, marks, repose), (patch.head(p).row, patch.head(p).column)
-    box[0], box[1], box[2], box[3] = first[0] + slid[0], first[1] + slid[1], first[0] + slid[2], first[1] + slid[3]
+    moved = sweeps.lower(model, m, t, address, p, marks, repose, box)
+    slides.settle(p, marks, repose, passed, box)
     release(memory)
     return moved
 
@@ -153,7 +152,7 @@ def _recentre(model, m, t, address, field, marks):
 def _gather(model, m, t, address, field, marks, boxes):
     """Fill the boxes, (n, 4), with the cells to look at about each body: what it covers, if it moved, and what slides.
 
-    Where they come near one another, they are joined.
+    Those that overlap are joined.
     """
     own = doubles(stack_doubles(4), 4)
     for k in range(len(boxes)):
@@ -167,7 +166,7 @@ def _gather(model, m, t, address, field, marks, boxes):
                 covers.add_prints(t, body, surface, field, marks, boxes[k])
         covers.join(boxes[k], trace.unsettled)
         covers.empty(trace.unsettled)
-    covers.merge(boxes, 2 * MARGIN)
+    covers.merge(boxes)
 
 
 @exact
@@ -175,14 +174,14 @@ def _look(model, m, t, address, sand, boxes):
     """Mark what was swept since the ruts were looked at, and let sand slide."""
     at, bed = instance.ruts(address), fields.sand_at(sand).bed
     head, marks, field = ruts.ruts_at(at), ruts.marks_of(bed, at), fields.field_of(sand, False)
-    head.clock = 0.0
+    passed, head.clock = head.clock, 0.0
     if _recentre(model, m, t, address, field, marks):
         marks = ruts.marks_of(bed, at)
         _average(marks)
     _gather(model, m, t, address, field, marks, boxes)
     for k in range(len(boxes)):
         if not covers.is_empty(boxes[k]):
-            head.moved += _work(model, m, t, address, field, marks, boxes[k], bed_at(bed).mu_int)
+            head.moved += _work(model, m, t, address, field, marks, boxes[k], bed_at(bed).mu_int, passed)
             covers.join(instance.trace(address, k).unsettled, boxes[k])
 
 

@@ -14,13 +14,16 @@ from rftsim.law.vectors import larger
 from rftsim.machine.compiling import exact, inline, loop
 from rftsim.machine.memory import peek, poke
 
-PASSES: Final = 8
-"""Passes over a patch in one go; what is not at rest by then goes on sliding the next time."""
+RATE: Final = 800.0
+"""Passes over a patch per second, as far as it was not looked at before; what is not at rest then goes on sliding."""
+MOST: Final = 8
+"""Passes in one go."""
 SHARE: Final = 0.15
 """Share of what is too much that moves over an edge in a pass; with more than a sixth, stripes of cells would grow."""
+REACH: Final = 2
+"""Cells beyond those where it may be too steep that are looked at."""
 REST: Final = 0.97
 """Slope at which what slides comes to rest, over that at which it begins."""
-_DIAGONAL: Final = 2.0**0.5
 
 
 @inline
@@ -41,7 +44,7 @@ def _row(level, flow, start, count, columns, steepest):
         here = peek(level, at)
         total = _over(here, peek(level, at - 1), steepest) + _over(here, peek(level, at + 1), steepest)
         total += _over(here, peek(level, at - columns), steepest) + _over(here, peek(level, at + columns), steepest)
-        wide = _DIAGONAL * steepest
+        wide = patch.DIAGONAL * steepest
         total += _over(here, peek(level, at - columns - 1), wide) + _over(here, peek(level, at + columns + 1), wide)
         total += _over(here, peek(level, at - columns + 1), wide) + _over(here, peek(level, at + columns - 1), wide)
         poke(flow, at, total)
@@ -89,25 +92,45 @@ def _wider(p, box):
 
 
 @exact
-def settle(p, marks, repose):
-    """Let the sand of a patch slide for some passes, at the tangent of its repose; the box of what still slides."""
+def _inside(p, box, margin):
+    """A box of cells of the ground, and a margin, as one of the patch, less its edge."""
+    head = patch.head(p)
+    low = max(int(box[0]) - margin - head.row, 1), max(int(box[1]) - margin - head.column, 1)
+    high = int(box[2]) + margin - head.row, int(box[3]) + margin - head.column
+    return low[0], low[1], min(high[0], head.rows - 1), min(high[1], head.columns - 1)
+
+
+@exact
+def settle(p, marks, repose, passed, box):
+    """Let sand slide.
+
+    Args:
+        p: Address of the patch's table.
+        marks: The ruts.
+        repose: Tangent of the angle at which the sand rests.
+        passed: Time since it was let slide the last time [s].
+        box: Cells where it may be too steep, first row and column and those behind the last; becomes those where it
+            still may be, (4,).
+    """
     head, height, level = patch.head(p), patch.height(p), patch.level(p)
     _fill_levels(p, ruts.GAP * marks.spacing)
-    box, touched = (1, 1, head.rows - 1, head.columns - 1), (head.rows, head.columns, 0, 0)
-    for _ in range(PASSES):
-        box = _pass(p, repose * marks.spacing, box)
-        if box[2] <= box[0]:
+    now, touched = _inside(p, box, REACH), (head.rows, head.columns, 0, 0)
+    for _ in range(min(max(int(RATE * passed + 0.5), 1), MOST)):
+        now = _pass(p, repose * marks.spacing, now)
+        if now[2] <= now[0]:
             break
         touched = (
-            min(touched[0], box[0]),
-            min(touched[1], box[1]),
-            max(touched[2], box[2]),
-            max(touched[3], box[3]),
+            min(touched[0], now[0]),
+            min(touched[1], now[1]),
+            max(touched[2], now[2]),
+            max(touched[3], now[3]),
         )
-        box = _wider(p, box)
+        now = _wider(p, now)
     for i in range(touched[0], touched[2]):
         for j in range(touched[1], touched[3]):
             if level[i, j] == level[i, j] and level[i, j] != height[i, j]:
                 patch.raise_cell(p, marks, i, j, level[i, j] - height[i, j])
     is_out = touched[0] <= 1 or touched[1] <= 1 or touched[2] >= head.rows - 1 or touched[3] >= head.columns - 1
-    return touched if is_out and touched[2] > touched[0] else box
+    still = touched if is_out and touched[2] > touched[0] else now
+    box[0], box[1] = head.row + still[0], head.column + still[1]
+    box[2], box[3] = head.row + still[2], head.column + still[3]

@@ -5,6 +5,7 @@ than into it, to the nearest before it. What a body rolls over, so that its surf
 middle, comes out behind it and at its sides: in a continuum in plane strain a wheel leaves no rut.
 """
 
+from collections import namedtuple
 from typing import Final
 
 import numpy as np
@@ -20,6 +21,12 @@ from rftsim.machine.memory import doubles, on_stack, peek, poke, stack_doubles
 
 RINGS: Final = 3
 """Rings of cells about one in which the nearest that no body holds is looked for first."""
+LEAST: Final = 0.02
+"""Depth to which a body may lie in the sand before it is lowered [cells]."""
+ROLLING: Final = 0.02
+"""Least share of what is displaced that comes out behind what rolls over it, if any does."""
+_WAYS: Final = 9
+"""Directions to a cell's neighbours, and itself in their middle."""
 ACROSS: Final = 0.5
 """Share of a surface's speed along the level from which on it pushes the sand ahead by a cell."""
 _found = on_stack(3 * BLOCK, types.float64)
@@ -90,107 +97,84 @@ def _note(p, found, count, k):
 
 
 @exact
-def _find_targets(p, gap):
-    """Fill the nearest cell that no body holds, for each; -1 where there is none. Passes down and up, to neighbours."""
-    target, rows, columns = patch.target(p), patch.head(p).rows, patch.head(p).columns
-    patch.head(p).has_targets = 1
-    for i in range(rows):
-        for j in range(columns):
-            target[i, j] = -1.0 if patch.is_held(p, i, j, gap) else i * columns + j
-    for way in (1, -1):
-        for a in range(rows):
-            i = a if way == 1 else rows - 1 - a
-            for b in range(columns):
-                j = b if way == 1 else columns - 1 - b
-                _take_nearer(p, i, j, i, j - way)
-                _take_nearer(p, i, j, i - way, j - way)
-                _take_nearer(p, i, j, i - way, j)
-                _take_nearer(p, i, j, i - way, j + way)
-            for b in range(columns):
-                j = columns - 1 - b if way == 1 else b
-                _take_nearer(p, i, j, i, j + way)
-
-
-@inline
-def _distance2(p, i, j, cell):
-    """The square of the distance to a cell, by its place in the patch [cells]."""
-    columns = patch.head(p).columns
-    row, column = int(cell) // columns, int(cell) % columns
-    return (row - i) * (row - i) + (column - j) * (column - j)
-
-
-@exact
-def _take_nearer(p, i, j, a, b):
-    """Let a cell have the target of another, where that is nearer than its own."""
-    target, rows, columns = patch.target(p), patch.head(p).rows, patch.head(p).columns
-    if not (0 <= a < rows and 0 <= b < columns) or target[a, b] < 0.0:
-        return
-    if target[i, j] < 0.0 or _distance2(p, i, j, target[a, b]) < _distance2(p, i, j, target[i, j]):
-        target[i, j] = target[a, b]
-
-
-@exact
 def _nearest2(p, i, j, gap):
-    """The square of the distance from a cell to the nearest that no body holds, within RINGS [cells]; else -1."""
-    rows, columns, best = patch.head(p).rows, patch.head(p).columns, -1
+    """The square of the distance from a cell to the nearest ones that no body holds, within RINGS [cells]; else -1.
+
+    And how many they are.
+    """
+    rows, columns, best, count = patch.head(p).rows, patch.head(p).columns, -1, 0
     for ring in range(RINGS + 1):
-        if 0 <= best <= ring * ring:
+        if 0 <= best < ring * ring:
             break
         for a in range(max(i - ring, 0), min(i + ring + 1, rows)):
             step = 1 if abs(a - i) == ring else max(2 * ring, 1)
             for b in range(j - ring, j + ring + 1, step):
                 away = (a - i) * (a - i) + (b - j) * (b - j)
-                if 0 <= b < columns and (best < 0 or away < best) and not patch.is_held(p, a, b, gap):
+                if 0 <= b < columns and (best < 0 or away <= best) and not patch.is_held(p, a, b, gap):
+                    count = count + 1 if away == best else 1
                     best = away
-    return best
+    return best, count
 
 
 @exact
 def _drop_far(p, i, j, depth, steepest, gap):
-    """Drop sand on the nearest cell that no body holds, farther than RINGS; whether there is any."""
-    if patch.head(p).has_targets == 0:
-        _find_targets(p, gap)
-    cell, columns = int(patch.target(p)[i, j]), patch.head(p).columns
-    if cell < 0:
+    """Drop sand on the nearest cells that no body holds, of those along rows, columns and diagonals; whether any is."""
+    walks, best, count = doubles(stack_doubles(_WAYS), _WAYS), np.inf, 0
+    for way in range(_WAYS):
+        x, y = float(way % 3 - 1), float(way // 3 - 1)
+        n = _walk(p, i, j, x, y, gap) if way != _WAYS // 2 else 0
+        walks[way] = n * np.sqrt(x * x + y * y) if n > 0 else np.inf
+        best = min(best, walks[way])
+    for way in range(_WAYS):
+        count += walks[way] < np.inf and walks[way] == best
+    if count == 0:
         return False
-    _drop(p, cell // columns, cell % columns, depth, steepest, gap)
+    for way in range(_WAYS):
+        x, y = float(way % 3 - 1), float(way // 3 - 1)
+        if walks[way] == best:
+            n = int(np.rint(best / np.sqrt(x * x + y * y)))
+            _give(p, i, j, x, y, n, depth / count, steepest, gap)
     return True
 
 
 @exact
 def _spread(p, i, j, depth, steepest, gap):
     """Drop sand on the cells nearest to one that no body holds, on all of them the same; whether there is any."""
-    rows, columns, away = patch.head(p).rows, patch.head(p).columns, _nearest2(p, i, j, gap)
+    rows, columns, (away, count) = patch.head(p).rows, patch.head(p).columns, _nearest2(p, i, j, gap)
     if away < 0:
         return _drop_far(p, i, j, depth, steepest, gap)
-    reach, count = int(np.sqrt(float(away))) + 1, 0
-    for counting in (True, False):
-        for a in range(max(i - reach, 0), min(i + reach + 1, rows)):
-            for b in range(max(j - reach, 0), min(j + reach + 1, columns)):
-                if (a - i) * (a - i) + (b - j) * (b - j) != away or patch.is_held(p, a, b, gap):
-                    continue
-                if counting:
-                    count += 1
-                else:
-                    _drop(p, a, b, depth / count, steepest, gap)
+    reach = int(np.sqrt(float(away)))
+    for a in range(max(i - reach, 0), min(i + reach + 1, rows)):
+        for b in range(max(j - reach, 0), min(j + reach + 1, columns)):
+            if (a - i) * (a - i) + (b - j) * (b - j) == away and not patch.is_held(p, a, b, gap):
+                _drop(p, a, b, depth / count, steepest, gap)
     return True
 
 
+_Motion = namedtuple("_Motion", ["v", "w", "at", "along", "across"])
+_Motion.__doc__ = """A body's velocity [m/s] and angular velocity [rad/s]; where it is [m]; and its middle's velocity along
+the level [m/s]."""
+
+
 @exact
-def _motion(model, m, t, address, p, i, j, marks, out):
-    """Fill out with the velocity of the body's point over a cell, and with that of its middle along the level, (5,)."""
-    head, twist = patch.head(p), doubles(stack_doubles(6), 6)
-    body = instance.body(address, int(patch.mover(p)[i, j]))
+def _motion_of(model, m, t, address, k):
+    """How the k-th body moves, see _Motion."""
+    twist, body, surface = doubles(stack_doubles(6), 6), instance.body(address, k), instance.surface(model, m, address, k)
     bodies.twist(t, body, twist[:3], twist[3:])
-    at, v, w = t.xpos[3 * body : 3 * body + 3], twist[:3], twist[3:]
-    x = (head.column + j) * marks.spacing - at[0]
-    y = (head.row + i) * marks.spacing - at[1]
+    v, w, at = (twist[0], twist[1], twist[2]), (twist[3], twist[4], twist[5]), t.xpos[3 * body : 3 * body + 3]
+    r, low, high = t.xmat[9 * body : 9 * body + 9], header_at(surface).lowest, header_at(surface).highest
+    x, y, z = to_world(r, 0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.5 * (low[2] + high[2]))
+    return _Motion(v, w, (at[0], at[1], at[2]), v[0] + w[1] * z - w[2] * y, v[1] + w[2] * x - w[0] * z)
+
+
+@exact
+def _fill_motion(p, own, i, j, marks, out):
+    """Fill out with the velocity of the body's point over a cell, and with that of its middle along the level, (5,)."""
+    head, (v, w, at) = patch.head(p), (own.v, own.w, own.at)
+    x, y = (head.column + j) * marks.spacing - at[0], (head.row + i) * marks.spacing - at[1]
     z = patch.lowest(p)[i, j] - at[2]
     out[0], out[1], out[2] = v[0] + w[1] * z - w[2] * y, v[1] + w[2] * x - w[0] * z, v[2] + w[0] * y - w[1] * x
-    header = header_at(instance.surface(model, m, address, int(patch.mover(p)[i, j])))
-    r, low, high = t.xmat[9 * body : 9 * body + 9], header.lowest, header.highest
-    x, y, z = to_world(r, 0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.5 * (low[2] + high[2]))
-    out[3], out[4] = v[0] + w[1] * z - w[2] * y, v[1] + w[2] * x - w[0] * z
+    out[3], out[4] = own.along, own.across
 
 
 @exact
@@ -214,9 +198,9 @@ def _drop(p, i, j, depth, steepest, gap):
         lowest, a, b = 0.0, i, j
         for row in range(max(i - 1, 0), min(i + 2, rows)):
             for column in range(max(j - 1, 0), min(j + 2, columns)):
-                away = np.sqrt(float((row - i) * (row - i) + (column - j) * (column - j)))
+                away = patch.DIAGONAL if row != i and column != j else 1.0
                 fall = height[i, j] - height[row, column] - steepest * away
-                if away > 0.0 and fall > lowest and not patch.is_held(p, row, column, gap):
+                if fall > lowest and not patch.is_held(p, row, column, gap):
                     lowest, a, b = fall, row, column
         if lowest == 0.0:
             patch.flow(p)[i, j] += depth
@@ -236,7 +220,7 @@ def _roll_over(p, i, j, motion, depth, steepest, gap):
     speed = np.sqrt(motion[3] * motion[3] + motion[4] * motion[4])
     slow = np.sqrt(motion[0] * motion[0] + motion[1] * motion[1])
     share = 1.0 - slow / speed if slow < speed else 0.0
-    if share == 0.0:
+    if share < ROLLING:
         return 0.0
     x, y = motion[3] / speed, motion[4] / speed
     back, left, right = _walk(p, i, j, -x, -y, gap), _walk(p, i, j, -y, x, gap), _walk(p, i, j, y, -x, gap)
@@ -265,28 +249,46 @@ def _push(p, i, j, motion, depth, steepest, gap):
 
 
 @exact
-def lower(model, m, t, address, p, marks, repose):
-    """Lower the sand to what bodies have swept, and raise it beside them; the volume that was displaced [m^3]."""
-    height, lowest, flow = patch.height(p), patch.lowest(p), patch.flow(p)
+def lower(model, m, t, address, p, marks, repose, box):
+    """Lower the sand to what bodies have swept, and raise it beside them; the volume that was displaced [m^3].
+
+    A box of cells of the ground, (4,), is widened by those that rise or fall.
+    """
+    height, lowest, flow, mover = patch.height(p), patch.lowest(p), patch.flow(p), patch.mover(p)
     rows, columns, gap = patch.head(p).rows, patch.head(p).columns, ruts.GAP * marks.spacing
     displaced, motion, steepest = 0.0, doubles(stack_doubles(5), 5), repose * marks.spacing
     for i in range(rows):
         for j in range(columns):
             flow[i, j] = 0.0
+    last = 0
+    own = _motion_of(model, m, t, address, last)
     for i in range(rows):
         for j in range(columns):
             depth = height[i, j] - lowest[i, j]
-            if not depth > 0.0:
+            if not depth > LEAST * marks.spacing:
                 continue
-            _motion(model, m, t, address, p, i, j, marks, motion)
+            if int(mover[i, j]) != last:
+                last = int(mover[i, j])
+                own = _motion_of(model, m, t, address, last)
+            _fill_motion(p, own, i, j, marks, motion)
             under = _roll_over(p, i, j, motion, depth, steepest, gap)
             if not _push(p, i, j, motion, depth - under, steepest, gap):
                 depth = under  # nowhere to go in this patch: it stays, until the body has moved on
             flow[i, j] -= depth
             displaced += depth
     if displaced > 0.0:
-        for i in range(rows):
-            for j in range(columns):
-                if flow[i, j] != 0.0:
-                    patch.raise_cell(p, marks, i, j, flow[i, j])
+        _raise_all(p, marks, box)
     return displaced * marks.spacing * marks.spacing
+
+
+@exact
+def _raise_all(p, marks, box):
+    """Let all cells of a patch rise by their flow, and widen a box of cells of the ground by them, (4,)."""
+    flow, head = patch.flow(p), patch.head(p)
+    for i in range(head.rows):
+        for j in range(head.columns):
+            if flow[i, j] != 0.0:
+                patch.raise_cell(p, marks, i, j, flow[i, j])
+                row, column = head.row + i, head.column + j
+                box[0], box[1] = min(box[0], row), min(box[1], column)
+                box[2], box[3] = max(box[2], row + 1), max(box[3], column + 1)
