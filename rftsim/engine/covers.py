@@ -5,7 +5,6 @@ A box that holds no cell ends where it starts.
 
 from typing import Final
 
-from rftsim.engine import bodies
 from rftsim.law import field as fields
 from rftsim.law import ruts
 from rftsim.law.body import header_at

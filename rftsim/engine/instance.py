@@ -168,7 +168,7 @@ def ruts(address):
 
 @exact
 def trace(address, k):
-    """What the ruts of a block remember of its k-th body, a record TRACE."""
+    """The record TRACE of the k-th body of a block, behind its ruts."""
     known = head(address)
     return _trace_at(ruts(address) + 8 * (known.ruts_size - TRACE_NUMBERS * (known.nbody - k)))
 

@@ -51,7 +51,12 @@ def _fill_run(heights, start, count, field, x, y, spacing, values, place):
 def fill(p, field, marks):
     """Fill the heights of a patch's cells, and no body over them; the highest [m]."""
     table, heights, bodies, top = head(p), flat(p, height(p)), flat(p, lowest(p)), -np.inf
-    values, x, rows, columns = doubles(marks.cells, marks.rows * marks.columns), marks.spacing, table.rows, table.columns
+    values, x, rows, columns = (
+        doubles(marks.cells, marks.rows * marks.columns),
+        marks.spacing,
+        table.rows,
+        table.columns,
+    )
     first = min(columns, marks.columns - (table.column & (marks.columns - 1)))  # behind it they go on from the start
     for i in range(rows):
         row = table.row + i

@@ -142,9 +142,7 @@ def _recentre(model, m, t, address, field, marks):
     cover = doubles(stack_doubles(4), 4)
     covers.empty(cover)
     for k in range(instance.head(address).nbody):
-        covers.add_body(
-            t, instance.body(address, k), instance.surface(model, m, address, k), field, marks, cover
-        )
+        covers.add_body(t, instance.body(address, k), instance.surface(model, m, address, k), field, marks, cover)
     return not covers.is_empty(cover) and _follow(ruts.ruts_at(instance.ruts(address)), marks, cover)
 
 

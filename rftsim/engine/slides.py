@@ -102,7 +102,7 @@ def _inside(p, box, margin):
 
 @exact
 def settle(p, marks, repose, passed, box):
-    """Let sand slide.
+    """Let the sand of a patch slide for some passes, as many as the time that passed allows.
 
     Args:
         p: Address of the patch's table.

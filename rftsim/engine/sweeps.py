@@ -16,7 +16,7 @@ from rftsim.law import ruts
 from rftsim.law.body import header_at
 from rftsim.law.layout import BLOCK, BOX_NUMBERS, prints_start
 from rftsim.law.vectors import nine, to_world
-from rftsim.machine.compiling import exact, inline, loop
+from rftsim.machine.compiling import exact, loop
 from rftsim.machine.memory import doubles, on_stack, peek, poke, stack_doubles
 
 RINGS: Final = 3
@@ -152,14 +152,18 @@ def _spread(p, i, j, depth, steepest, gap):
 
 
 _Motion = namedtuple("_Motion", ["v", "w", "at", "along", "across"])
-_Motion.__doc__ = """A body's velocity [m/s] and angular velocity [rad/s]; where it is [m]; and its middle's velocity along
-the level [m/s]."""
+_Motion.__doc__ = """A body's velocity [m/s] and angular velocity [rad/s]; where it is [m]; and its middle's velocity
+along the level [m/s]."""
 
 
 @exact
 def _motion_of(model, m, t, address, k):
     """How the k-th body moves, see _Motion."""
-    twist, body, surface = doubles(stack_doubles(6), 6), instance.body(address, k), instance.surface(model, m, address, k)
+    twist, body, surface = (
+        doubles(stack_doubles(6), 6),
+        instance.body(address, k),
+        instance.surface(model, m, address, k),
+    )
     bodies.twist(t, body, twist[:3], twist[3:])
     v, w, at = (twist[0], twist[1], twist[2]), (twist[3], twist[4], twist[5]), t.xpos[3 * body : 3 * body + 3]
     r, low, high = t.xmat[9 * body : 9 * body + 9], header_at(surface).lowest, header_at(surface).highest

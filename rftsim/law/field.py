@@ -25,8 +25,8 @@ Level.__doc__ = """The bed's plane: its height at the origin [m], its slopes alo
 plane of motion of a planar law."""
 _head_at, _plane_at = values_at(TERRAIN, Head), values_at(BED, Plane)
 Field = namedtuple("Field", ["level", "grid", "marks", "is_planar"])
-Field.__doc__ = """A relief in memory: the bed's plane; the terrain's grid; the ruts; and whether the law acts in a plane
-of motion (0 or 1)."""
+Field.__doc__ = """A relief in memory: the bed's plane; the terrain's grid; the ruts; and whether the law acts in a
+plane of motion (0 or 1)."""
 
 
 @inline

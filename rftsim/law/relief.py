@@ -236,17 +236,18 @@ def _three(chosen, stride, i, column):
 @inline
 def _poke_three(array, stride, i, column, numbers):
     """Write numbers of the i-th face in three columns from one on."""
-    at = i + column * stride
-    poke(array, at, numbers[0])
-    poke(array, at + stride, numbers[1])
-    poke(array, at + 2 * stride, numbers[2])
+    at, (a, b, c) = i + column * stride, numbers
+    poke(array, at, a)
+    poke(array, at + stride, b)
+    poke(array, at + 2 * stride, c)
 
 
 @inline
 def _keep(chosen, stride, i, found):
     """Write four numbers of the i-th face behind its columns."""
-    _poke_three(chosen, stride, i, FOUND, found)
-    poke(chosen, i + (FOUND + 3) * stride, found[3])
+    a, b, c, d = found
+    _poke_three(chosen, stride, i, FOUND, (a, b, c))
+    poke(chosen, i + (FOUND + 3) * stride, d)
 
 
 @inline

@@ -31,8 +31,8 @@ ruts_at = record_at(RUTS)
 _Cells = namedtuple("_Cells", ["spacing", "rows", "columns"])
 _cells_at = values_at(BED, _Cells)
 Marks = namedtuple("Marks", ["spacing", "rows", "columns", "row", "column", "cells", "blocks"])
-Marks.__doc__ = """Ruts in memory: side of a cell [m]; how many, int64; the first ones; the address of the cells; the grid
-of the blocks' means, whose padding is zero."""
+Marks.__doc__ = """Ruts in memory: side of a cell [m]; how many, int64; the first ones; the address of the cells; the
+grid of the blocks' means, whose padding is zero."""
 
 
 @inline
@@ -69,7 +69,7 @@ def cell(x, spacing):
 
 @inline_loop
 def along(x, spacing, first, count):
-    """Of a coordinate [m], along an axis with so many cells from one on: the nearest pair of cells in the window.
+    """The pair of cells that is nearest to a coordinate [m], along an axis with so many cells from one on.
 
     Returns:
         The first of both, how far the coordinate lies beyond it [cells], and whether it lies between them (0 or 1).

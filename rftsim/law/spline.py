@@ -9,7 +9,7 @@ from rftsim.law.vectors import larger, smaller
 from rftsim.machine.compiling import inline, inline_loop
 from rftsim.machine.memory import doubles, peek
 
-Grid = namedtuple("Grid", ["first", *("rows", "columns", "x", "y", "per_x", "per_y"), "per_row", "per_column"])
+Grid = namedtuple("Grid", ["first", "rows", "columns", "x", "y", "per_x", "per_y", "per_row", "per_column"])
 Grid.__doc__ = """Padded coefficients: the address of the first, zero where there are none; how many there are along y
 and x, less the PAD on each side; place of the first that is no padding [m]; values per metre; one over the numbers of
 rows and of columns after which they repeat, zero where they do not."""
