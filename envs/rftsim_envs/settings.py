@@ -38,6 +38,8 @@ def parsed(kind: Any, value: Any) -> Any:
     if get_origin(kind) is tuple:
         first, *others = get_args(kind)
         parts = value.split(",") if isinstance(value, str) else list(value)
+        if value == "" and others == [...]:
+            return ()
         if others != [...] and len(parts) != 1 + len(others):
             raise ValueError
         return tuple(parsed(first, part) for part in parts)
@@ -68,5 +70,6 @@ def _wanted(kind: Any) -> str:
     if get_origin(kind) is Literal:
         return " or ".join(map(repr, get_args(kind)))
     if get_origin(kind) is tuple:
-        return "whole numbers: 64,64" if get_args(kind)[0] is int else "numbers: low,high"
+        named = {int: "whole numbers: 64,64", str: "names with commas between them"}
+        return named.get(get_args(kind)[0], "numbers: low,high")
     return {float: "a finite number", int: "a whole number", bool: "true or false", str: "text"}[kind]

@@ -122,7 +122,9 @@ class Evaluate:
 
 def _name(plan: Any, group: Path, runs: int) -> str:
     seeds = f", {runs} runs" if runs > 1 else ""
-    return f"{plan.task} trained on {plan.settings['ground']} ({group.name}{seeds})"
+    from rftsim_envs.tasks import title
+
+    return f"{title(plan.task)} trained on {plan.settings['ground']} ({group.name}{seeds})"
 
 
 def _spread(one: "Score") -> str:

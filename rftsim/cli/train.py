@@ -30,10 +30,13 @@ class Train:
     killed goes on from its checkpoint when the same command is given again, with new episodes.
 
     Example: rftsim train FourFlapRunner --steps 500000 --out out/runner
+
+    A robot of one's own: rftsim train Locomotion --set model=unitree_go1/scene.xml --out out/go1
     """
 
     env: tyro.conf.Positional[str]
-    """rftsim/NAME-v0, or NAME."""
+    """rftsim/NAME-v0 or NAME; or a task of one's own, FILE.py:CLASS or MODULE:CLASS. Locomotion takes a robot of one's
+    own: --set model=PATH."""
     out: Path
     """Folder of the run."""
     algo: Literal["ppo"] = "ppo"
@@ -89,12 +92,13 @@ class Train:
             sys.exit(130)
 
     def _train_here(self, plans: "dict[str, Plan]") -> "dict[str, Trained]":
+        from rftsim_envs.tasks import title
         from rftsim_envs.training.ppo import train
 
         found = {}
         with interruptible() as stop:
             for name, plan in plans.items():
-                with showing(name or plan.task, plan.training.steps, self.json) as report:
+                with showing(name or title(plan.task), plan.training.steps, self.json) as report:
                     found[name] = train(
                         plan,
                         self.out / name,

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from rftsim_envs import ConfigError, SandEnv, SandVectorEnv
 from rftsim_envs.grouser_wheel import GROUSER_WHEEL, RADIUS, slip, tracking
-from rftsim_envs.quadruped import Quadruped, closeness
+from rftsim_envs.quadruped import Quadruped
 from rftsim_envs.rover import BURIED, Rover, digging, progress
 from rftsim_envs.rover import RADIUS as ROVER_RADIUS
+from rftsim_envs.walking import closeness
 
 GROUNDS = ("sand", "rigid")
 
