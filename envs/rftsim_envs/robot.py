@@ -271,8 +271,8 @@ def _check_upright(data: mujoco.MjData, base: str) -> None:
     up = float(data.body(base).xmat[8])
     if up < UPRIGHT:
         raise ConfigError(
-            f"the z axis of {base} leans by {math.degrees(math.acos(max(up, -1.0))):.0f} degrees in the pose; it has to "
-            "point up, as tipping over is told by it: take another keyframe"
+            f"the z axis of {base} leans by {math.degrees(math.acos(max(up, -1.0))):.0f} degrees in the pose; it "
+            "has to point up, as tipping over is told by it: take another keyframe"
         )
 
 

@@ -114,7 +114,8 @@ def _own(module: ModuleType) -> dict[str, type[Task]]:
 def _only(module: ModuleType, name: str) -> type[Task]:
     own = _own(module)
     if len(own) != 1:
-        raise ConfigError(f"{name} has {len(own) or 'no'} tasks; name one of its own: {name}:{' or '.join(own)}")
+        names = " or ".join(f"{name}:{one}" for one in own)
+        raise ConfigError(f"{name} has {len(own)} tasks: name one of them, {names}" if own else f"{name} has no task")
     return next(iter(own.values()))
 
 
