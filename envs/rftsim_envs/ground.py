@@ -32,9 +32,9 @@ class Draw(NamedTuple):
     """Sines of the slope along x and y."""
 
 
-def lay(task: Task, robot: mujoco.MjSpec | None = None) -> mujoco.MjModel:
-    """The model of a task's robot, or of another in its place, on the task's ground."""
-    config, spec = task.config, task.build() if robot is None else robot
+def lay(task: Task) -> mujoco.MjModel:
+    """The model of a task's robot on the task's ground."""
+    config, spec = task.config, task.build()
     spec.option.timestep = config.timestep
     if config.ground == "sand":
         options = {"bodies": task.felt, "max_edge": task.edge, **WHOLE, "ruts": config.ruts, **task.options()}

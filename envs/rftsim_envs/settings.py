@@ -1,6 +1,7 @@
 """Settings as people give them: each field of a frozen dataclass gets the type that it is declared with."""
 
 import math
+import os
 from collections.abc import Iterable
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
@@ -46,6 +47,8 @@ def parsed(kind: Any, value: Any) -> Any:
     if kind is bool:
         return _one_of(("false", "true"), str(value).lower()) == "true"
     if kind is str:
+        if isinstance(value, os.PathLike):
+            return os.fspath(value)
         if not isinstance(value, str):
             raise TypeError
         return value

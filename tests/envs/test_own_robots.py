@@ -223,6 +223,7 @@ def test_the_farthest_point_of_every_geom_is_on_it_and_farthest():
         ({"pose": "elbow=1"}, "no joint 'elbow'; the robot has hip_fl"),
         ({"reach": "0.1,0.2"}, "reach has 2 numbers, and actions 8"),
         ({"reach": "-1"}, "reach must be positive"),
+        ({"reduction": 1}, "reduction must be at least 0 and below 1"),
         ({"history": 0}, "history must be from 1 to 100"),
     ],
 )
