@@ -35,7 +35,7 @@ UPRIGHT: Final = 0.97
 
 
 class Choice(NamedTuple):
-    """What a robot's user says of its file; empty texts and tuples stand for what is found."""
+    """Choices that a user makes of what is in a robot's file; empty texts and tuples stand for what is found."""
 
     base: str = ""
     """Name of the body with the free joint."""

@@ -48,7 +48,7 @@ def make(task: "str | type[Task]", settings: dict[str, Any]) -> Task:
 
 
 def find(task: "str | type[Task]") -> type[Task]:
-    """The class of a task.
+    """Find the class of a task by what names it.
 
     Args:
         task: The class; or its name, NAME or rftsim/NAME-v0; or of one's own FILE.py:CLASS, FILE.py if that has one

@@ -119,6 +119,18 @@ def test_a_robot_that_does_nothing_stands(model):
     assert abs(info["speed"]) < 0.05
 
 
+@pytest.mark.parametrize("bits", ['contype="0" conaffinity="4"', 'contype="2" conaffinity="0"'])
+def test_a_rigid_floor_carries_whatever_collides(tmp_path, bits):
+    path = tmp_path / "climber.xml"
+    path.write_text(CLIMBER.replace("<worldbody>", f"<default><geom {bits}/></default><worldbody>"))
+    env = SandEnv("Locomotion", model=str(path), ground="rigid")
+    env.reset(seed=0)
+    for _ in range(25):
+        *_, info = env.step(neutral(env))
+    assert info["sinkage"] < 0.01
+    assert env.data.ncon > 0
+
+
 def neutral(env):
     """The action whose controls are those of the pose."""
     task = env.task

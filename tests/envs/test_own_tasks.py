@@ -91,6 +91,16 @@ def test_a_task_in_a_file_is_an_environment(file, form):
     assert np.ptp(seen[0]) > 0.0
 
 
+def test_a_task_in_a_file_is_one_of_dm_controls(file):
+    dm = pytest.importorskip("rftsim_envs.dm")
+    env, other = dm.load(f"{file}:Ball", random=1), SandEnv(f"{file}:Ball")
+    seen = [env.reset().observation["observations"]], [other.reset(seed=1)[0]]
+    for k in range(5):
+        seen[0].append(env.step(np.full(1, np.sin(k))).observation["observations"])
+        seen[1].append(other.step(np.full(1, np.sin(k)))[0])
+    np.testing.assert_array_equal(*seen)
+
+
 def test_a_task_has_one_reference(file, monkeypatch):
     """A name, a module or a file and a class, from which `find` gives the class again in any folder."""
     kind = tasks.find(f"{file}:Ball")

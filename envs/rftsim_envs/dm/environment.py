@@ -104,7 +104,7 @@ class SandTask(base.Task):
         return self._episodes
 
     def initialize_episode(self, physics: Physics) -> None:
-        """Begin the next episode."""
+        """Begin the next episode, drawn from the generator."""
         self.episodes(physics).restart([0], [self._rng])
         self.outcome = None
 
@@ -122,7 +122,7 @@ class SandTask(base.Task):
         physics.after_reset()
 
     def get_observation(self, physics: Physics) -> "collections.OrderedDict[str, Observation]":
-        """The observation under `observations`, (nobservation,)."""
+        """Give the observation under the name `observations`, (nobservation,)."""
         seen = self.episodes(physics).observation() if self.outcome is None else self.outcome.observation
         return collections.OrderedDict([(control.FLAT_OBSERVATION_KEY, seen[0])])
 

@@ -44,7 +44,7 @@ class Normalising(BaseFeaturesExtractor):
         self.register_buffer("count", torch.zeros((), dtype=torch.float64))
 
     def forward(self, observations: torch.Tensor) -> torch.Tensor:
-        """Normalised observations, (n, nobservation)."""
+        """Normalise observations, (n, nobservation), and cut what is far out."""
         spread = self.variance.clamp(min=TINY**2).sqrt()
         return ((observations - self.mean) / spread).clamp(-FARTHEST, FARTHEST).float()
 
