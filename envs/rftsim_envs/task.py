@@ -163,6 +163,10 @@ class Task(abc.ABC):
 
     A task holds no state of an episode: its methods take `Moment`s of n simulations and return arrays (n, ...).
 
+    One of one's own inherits this class, states `length` and `naction`, and has the methods below that are abstract.
+    Where it has settings of its own, `Settings` is a frozen dataclass that inherits `Config`, with keywords alone. It
+    serves wherever a task's name does, as the class or as FILE.py:CLASS.
+
     Attributes:
         Settings: Class of its configuration.
         felt: Bodies that feel the sand; None for all that can.
