@@ -8,7 +8,7 @@ import tempfile
 from pathlib import Path
 
 README = Path(__file__).parent.parent / "README.md"
-NEEDS_FILES = re.compile(r"robot\.xml|mesh\.stl|out/train|--data DIR|\.csv")
+NEEDS_FILES = re.compile(r"robot\.xml|my_task\.py|out/robot|mesh\.stl|out/train|--data DIR|\.csv")
 SHORTENED = {
     "train": "--steps 2048",
     "evaluate": "--episodes 1 --on sand",

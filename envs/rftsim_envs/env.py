@@ -1,18 +1,23 @@
 """A Gymnasium environment of one simulation."""
 
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 import gymnasium as gym
+import mujoco
 import numpy as np
 from gymnasium.utils import EzPickle
 from numpy.typing import ArrayLike, NDArray
 
+from rftsim.view.cameras import Follower
 from rftsim.view.render import Pictures
 from rftsim_envs import ground, tasks
 from rftsim_envs.episodes import Episodes, Observation
 from rftsim_envs.physics import One
+from rftsim_envs.task import Task
 
 Action = NDArray[np.float32]
+FOLLOW: Final = "follow"
+"""Name of the camera by which pictures are taken, of a model that has it."""
 
 
 class SandEnv(gym.Env[Observation, Action], EzPickle):
@@ -22,7 +27,7 @@ class SandEnv(gym.Env[Observation, Action], EzPickle):
     `info["diverged"]` and no reward. Actions outside -1 and 1 are clipped; those that are not finite are refused.
 
     Args:
-        task: Name of one of `rftsim_envs.TASKS`.
+        task: Name of a task, a class of one's own, or where that is: FILE.py:CLASS or MODULE:CLASS.
         render_mode: `rgb_array`, or None.
         width: Width of pictures [pixels].
         height: Height of pictures [pixels].
@@ -36,7 +41,7 @@ class SandEnv(gym.Env[Observation, Action], EzPickle):
 
     def __init__(
         self,
-        task: str,
+        task: "str | type[Task]",
         render_mode: Literal["rgb_array"] | None = None,
         width: int = 640,
         height: int = 480,
@@ -75,18 +80,26 @@ class SandEnv(gym.Env[Observation, Action], EzPickle):
         )
 
     def render(self) -> NDArray[np.uint8] | None:
-        """A picture by the camera `follow`, with the sand's forces, (height, width, 3); None without a render mode."""
+        """A picture with the sand's forces, (height, width, 3), by the model's camera `follow` or by one like it.
+
+        Without a render mode it is None.
+        """
         if self.render_mode is None:
             return None
         if self._pictures is None:
-            self._pictures = Pictures(self.model, *self._size)
-        return self._pictures.take(self.data, "follow")
+            self._pictures, self._follower = Pictures(self.model, *self._size), Follower(self.model)
+        return self._pictures.take(self.data, FOLLOW if has_camera(self.model) else self._follower.at(self.data))
 
     def close(self) -> None:
         """Let go of what pictures need."""
         if self._pictures is not None:
             self._pictures.close()
             self._pictures = None
+
+
+def has_camera(model: mujoco.MjModel) -> bool:
+    """Whether a model has the camera `follow`."""
+    return any(model.camera(i).name == FOLLOW for i in range(model.ncam))
 
 
 def spaces(episodes: Episodes) -> tuple[Any, Any]:

@@ -11,7 +11,7 @@ from rftsim_envs.limits import Limits
 from rftsim_envs.physics import Array, Flags, Physics
 from rftsim_envs.scan import Scan
 from rftsim_envs.start import Placer
-from rftsim_envs.task import Moment, Task
+from rftsim_envs.task import ConfigError, Moment, Task
 
 Observation = NDArray[np.float32]
 
@@ -40,9 +40,15 @@ class Episodes:
 
     Attributes:
         nobservation: Number of numbers in an observation.
+
+    Raises:
+        ConfigError: The model has no keyframe.
     """
 
     def __init__(self, task: Task, physics: Physics) -> None:
+        if not physics.model.nkey:
+            name = type(task).__name__
+            raise ConfigError(f"the model of {name} has no keyframe: the first one is where an episode starts")
         task.prepare(physics.model)
         self.task, self.physics, n = task, physics, physics.n
         self.ground = Ground(physics, task.config)
@@ -52,8 +58,10 @@ class Episodes:
         self._ctrl, self._sensors = physics.field("ctrl"), physics.field("sensordata")
         self._command, self._action = np.zeros((n, task.ncommand)), np.zeros((n, task.naction))
         self._count, self._energy, self._distance = np.zeros(n, dtype=int), np.zeros(n), np.zeros(n)
-        self._last = self._action.copy()
-        self.nobservation = self._observe(self._moment(self._qpos.copy(), np.zeros(n))).shape[1]
+        self._last, self._before = self._action.copy(), self._qpos.copy()
+        one = self._observe(self._moment(self._before, np.zeros(n)))
+        self._seen = np.zeros((n, task.config.history, one.shape[1]), dtype=np.float32)
+        self.nobservation = self._seen[0].size
 
     def restart(self, chosen: Sequence[int], rngs: Sequence[np.random.Generator]) -> None:
         """Begin episodes in the chosen simulations, each with a generator of its own."""
@@ -71,10 +79,12 @@ class Episodes:
         self.physics.restart(chosen, place)
         for kept in (self._count, self._energy, self._distance, self._action, self._last):
             kept[list(chosen)] = 0
+        self._seen[list(chosen)] = self._observe(self._now())[list(chosen), None]
 
     def observation(self) -> Observation:
-        """Observations at the start of an episode, (n, nobservation)."""
-        return self._observe(self._moment(self._qpos, np.zeros(self.physics.n)))
+        """Observations at the start of an episode, (n, nobservation); what came before it was as it is then."""
+        self._seen[:, -1] = self._observe(self._now())
+        return self._flat()
 
     def info(self) -> dict[str, NDArray[np.generic]]:
         """The `strength`, `friction` [-] and `slope_deg` [deg] of the ground that an episode has, (n,) each."""
@@ -91,15 +101,33 @@ class Episodes:
         Raises:
             ValueError: It has another shape, or is not finite.
         """
+        self.act(action)
+        return self.conclude(self.physics.step(self.task.config.substeps))
+
+    def act(self, action: ArrayLike) -> None:
+        """Begin a control step, for whoever takes its time steps himself: set the controls that actions ask for.
+
+        Args:
+            action: As of `step`.
+
+        Raises:
+            ValueError: As of `step`.
+        """
         wanted = np.array(action, dtype=float)
         if wanted.shape != self._action.shape or not np.isfinite(wanted).all():
             raise ValueError(f"the action must be finite and of shape {self._action.shape}, not {action!r}")
-        task, period = self.task, self.task.config.period
-        before = self._qpos.copy()
+        self._before = self._qpos.copy()
         self._last, self._action = self._action, np.clip(wanted, -1.0, 1.0)
-        self._ctrl[:] = task.controls(self._action, self._moment(before, np.zeros(len(before))))
-        power = self.physics.step(task.config.substeps)
-        moment, diverged = self._moment(before, power), self.physics.failed()
+        self._ctrl[:] = self.task.controls(self._action, self._moment(self._before, np.zeros(len(wanted))))
+
+    def conclude(self, power: Array) -> Outcome:
+        """End a control step that `act` began, after its time steps.
+
+        Args:
+            power: Mean positive power of the actuators over them [W], (n,).
+        """
+        task, period = self.task, self.task.config.period
+        moment, diverged = self._moment(self._before, power), self.physics.failed()
         terms, measures = task.rewards(moment), task.measures(moment)
         reached = task.reached(moment) & ~diverged
         self._count += 1
@@ -111,7 +139,11 @@ class Episodes:
         info["cost_of_transport"] = self._energy / (task.weight * np.maximum(self._distance, 1e-3))
         terminated = task.failed(moment) | reached | diverged
         truncated = (self._count >= task.config.steps) & ~terminated
-        return Outcome(self._observe(moment), reward, terminated, truncated, info)
+        return Outcome(self._look(moment), reward, terminated, truncated, info)
+
+    def _now(self) -> Moment:
+        """This moment as one at which an episode starts."""
+        return self._moment(self._qpos, np.zeros(self.physics.n))
 
     def _moment(self, before: Array, power: Array) -> Moment:
         return Moment(
@@ -128,7 +160,17 @@ class Episodes:
             relief=self.ground.relief,
         )
 
+    def _look(self, moment: Moment) -> Observation:
+        """Observations of a moment and of those before it, (n, nobservation), the latest at the end."""
+        self._seen[:, :-1] = self._seen[:, 1:]
+        self._seen[:, -1] = self._observe(moment)
+        return self._flat()
+
+    def _flat(self) -> Observation:
+        return self._seen.reshape(len(self._seen), -1).copy()
+
     def _observe(self, moment: Moment) -> Observation:
+        """Observations of one moment, (n, nobservation / history)."""
         seen = self.task.observe(moment)
         if self.task.config.scan:
             seen = np.hstack([seen, self._scan.heights(moment)])

@@ -32,9 +32,9 @@ class Draw(NamedTuple):
     """Sines of the slope along x and y."""
 
 
-def lay(task: Task, robot: mujoco.MjSpec | None = None) -> mujoco.MjModel:
-    """The model of a task's robot, or of another in its place, on the task's ground."""
-    config, spec = task.config, task.build() if robot is None else robot
+def lay(task: Task) -> mujoco.MjModel:
+    """The model of a task's robot on the task's ground."""
+    config, spec = task.config, task.build()
     spec.option.timestep = config.timestep
     if config.ground == "sand":
         options = {"bodies": task.felt, "max_edge": task.edge, **WHOLE, "ruts": config.ruts, **task.options()}
@@ -57,14 +57,16 @@ def _add_floor(spec: mujoco.MjSpec) -> None:
         rgb1=[0.45, 0.48, 0.52],
         rgb2=[0.52, 0.55, 0.60],
     )
+    bits = np.array([(geom.contype, geom.conaffinity) for geom in spec.geoms])
+    contype, conaffinity = np.bitwise_or.reduce(bits, axis=0).tolist()
     material = spec.add_material(name=FLOOR, texrepeat=[4, 4], texuniform=True)
     material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = FLOOR
     spec.worldbody.add_geom(
         name=FLOOR,
         type=mujoco.mjtGeom.mjGEOM_PLANE,
         size=[0, 0, 0.1],
-        contype=0,
-        conaffinity=1,
+        contype=conaffinity,  # whatever of the robot collides at all, collides with the floor
+        conaffinity=contype,
         friction=[FRICTION, 0.005, 0.0001],
         priority=1,  # the floor's friction counts, whatever the robot's
         material=FLOOR,

@@ -63,18 +63,22 @@ class Physics(Protocol):
 
 
 class One:
-    """One simulation, on data of its own.
+    """One simulation, on data of its own or of another.
 
     Args:
         model: Model that is simulated; it is not copied.
         advance: Takes a time step, as `mujoco.mj_step` does.
+        data: The model's data; by default its own.
     """
 
     def __init__(
-        self, model: mujoco.MjModel, advance: Callable[[mujoco.MjModel, mujoco.MjData], None] = mujoco.mj_step
+        self,
+        model: mujoco.MjModel,
+        advance: Callable[[mujoco.MjModel, mujoco.MjData], None] = mujoco.mj_step,
+        data: mujoco.MjData | None = None,
     ) -> None:
         self.model = self.shown = model
-        self.data, self.n = mujoco.MjData(model), 1
+        self.data, self.n = mujoco.MjData(model) if data is None else data, 1
         self._advance = advance
 
     def field(self, name: str) -> Array:

@@ -48,6 +48,8 @@ class Training:
         max_grad_norm: Largest norm of a gradient; longer ones are shortened to it.
         layers: Units in each hidden layer (tanh) of the policy and of the value, which share none.
         log_std_init: Log of the actions' standard deviation at the start.
+        normalise: Let the network see observations less their mean and over their standard deviation, which are learnt
+            from all that was collected, and kept in the policy.
     """
 
     steps: int = 1_000_000
@@ -64,6 +66,7 @@ class Training:
     max_grad_norm: float = 0.5
     layers: tuple[int, ...] = (64, 64)
     log_std_init: float = -0.5
+    normalise: bool = False
 
     def __post_init__(self) -> None:
         convert_fields(self, TrainingError)

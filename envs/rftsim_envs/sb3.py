@@ -14,6 +14,7 @@ from rftsim_envs.env import Action, spaces
 from rftsim_envs.episodes import Episodes, Observation
 from rftsim_envs.physics import Many
 from rftsim_envs.tally import Tally
+from rftsim_envs.task import Task
 
 
 class SandVecEnv(VecEnv):
@@ -24,7 +25,7 @@ class SandVecEnv(VecEnv):
     `TimeLimit.truncated`, and in `episode` what it came to, as `rftsim_envs.tally.Tally.take` has it.
 
     Args:
-        task: Name of one of `rftsim_envs.TASKS`.
+        task: Name of a task, a class of one's own, or where that is: FILE.py:CLASS or MODULE:CLASS.
         n_envs: Number of simulations.
         threads: Number of threads; 0 for as many as there are processors.
         **settings: Fields of the task's Config.
@@ -37,7 +38,7 @@ class SandVecEnv(VecEnv):
         ConfigError: No such task or setting.
     """
 
-    def __init__(self, task: str, n_envs: int, threads: int = 0, **settings: Any) -> None:
+    def __init__(self, task: "str | type[Task]", n_envs: int, threads: int = 0, **settings: Any) -> None:
         if n_envs < 1 or threads < 0:
             raise ValueError(f"n_envs must be at least 1 and threads 0, not {n_envs} and {threads}")
         self.task = tasks.make(task, settings)

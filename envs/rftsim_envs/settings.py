@@ -1,6 +1,7 @@
 """Settings as people give them: each field of a frozen dataclass gets the type that it is declared with."""
 
 import math
+import os
 from collections.abc import Iterable
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
@@ -38,12 +39,16 @@ def parsed(kind: Any, value: Any) -> Any:
     if get_origin(kind) is tuple:
         first, *others = get_args(kind)
         parts = value.split(",") if isinstance(value, str) else list(value)
+        if value == "" and others == [...]:
+            return ()
         if others != [...] and len(parts) != 1 + len(others):
             raise ValueError
         return tuple(parsed(first, part) for part in parts)
     if kind is bool:
         return _one_of(("false", "true"), str(value).lower()) == "true"
     if kind is str:
+        if isinstance(value, os.PathLike):
+            return os.fspath(value)
         if not isinstance(value, str):
             raise TypeError
         return value
@@ -68,5 +73,6 @@ def _wanted(kind: Any) -> str:
     if get_origin(kind) is Literal:
         return " or ".join(map(repr, get_args(kind)))
     if get_origin(kind) is tuple:
-        return "whole numbers: 64,64" if get_args(kind)[0] is int else "numbers: low,high"
+        named = {int: "whole numbers: 64,64", str: "names with commas between them"}
+        return named.get(get_args(kind)[0], "numbers: low,high")
     return {float: "a finite number", int: "a whole number", bool: "true or false", str: "text"}[kind]

@@ -20,6 +20,8 @@ from rftsim_envs.settings import check_positive, convert_fields
 
 MOST_SUBSTEPS, MOST_STEPS = 1e6, 1e9
 """Most time steps of a control step, and most control steps of an episode."""
+MOST_HISTORY: Final = 100
+"""Most control steps whose observations make up one."""
 MOST_PLACES: Final = 1000
 """Most places along the heading at which the ground is scanned."""
 
@@ -55,6 +57,8 @@ class Config:
             the ground without ruts over the root, in lengths of the robot: `length` of the task.
         observe_ground: Let the observation end with the ground's draw: log of both factors, and the sines of the slope
             along x and y. Otherwise it is hidden.
+        history: Number of control steps, the present one and those before it, whose observations make up one, the
+            latest at its end: from what was done and what came of it, a policy can tell which sand it is on.
         timestep: Time step of the physics [s].
         period: Duration of a control step [s]; a multiple of the timestep.
         duration: Duration of an episode, after which it is truncated [s].
@@ -74,6 +78,7 @@ class Config:
     ruts: bool = False
     scan: int = 0
     observe_ground: bool = False
+    history: int = 1
     timestep: float = 0.005
     period: float = 0.02
     duration: float = 10.0
@@ -94,6 +99,8 @@ class Config:
             raise ConfigError(f"slope_deg must be at least 0 and below 45, not {self.slope_deg:g}")
         if not math.isclose(self.substeps * self.timestep, self.period, rel_tol=1e-9) or self.substeps < 1:
             raise ConfigError(f"period = {self.period:g} s must be a multiple of timestep = {self.timestep:g} s")
+        if not 1 <= self.history <= MOST_HISTORY:
+            raise ConfigError(f"history must be from 1 to {MOST_HISTORY} control steps, not {self.history}")
         check_solution(self.tolerance, self.iterations, ConfigError)
         make_sand(self.sand)
         self._check_terrain()
@@ -156,6 +163,10 @@ class Task(abc.ABC):
 
     A task holds no state of an episode: its methods take `Moment`s of n simulations and return arrays (n, ...).
 
+    One of one's own inherits this class, states `length` and `naction`, and has the methods below that are abstract.
+    Where it has settings of its own, `Settings` is a frozen dataclass that inherits `Config`, with keywords alone. It
+    serves wherever a task's name does, as the class or as FILE.py:CLASS.
+
     Attributes:
         Settings: Class of its configuration.
         felt: Bodies that feel the sand; None for all that can.
@@ -170,9 +181,9 @@ class Task(abc.ABC):
     """
 
     Settings: ClassVar[type[Config]] = Config
-    felt: ClassVar[tuple[str, ...] | None] = None
+    felt: tuple[str, ...] | None = None
     planar: ClassVar[bool] = False
-    length: ClassVar[float]
+    length: float
     edge: ClassVar[float | None] = None
     ncommand: ClassVar[int] = 0
     training: ClassVar[Training] = Training()

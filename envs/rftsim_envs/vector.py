@@ -12,6 +12,7 @@ from rftsim_envs import ground, tasks
 from rftsim_envs.env import Action, spaces
 from rftsim_envs.episodes import Episodes, Observation
 from rftsim_envs.physics import Array, Flags, Many
+from rftsim_envs.task import Task
 
 
 class SandVectorEnv(VectorEnv[Observation, Action, NDArray[np.generic]]):
@@ -21,7 +22,7 @@ class SandVectorEnv(VectorEnv[Observation, Action, NDArray[np.generic]]):
     followed by the next one in the same step, and its end is in `final_obs` and `final_info`.
 
     Args:
-        task: Name of one of `rftsim_envs.TASKS`.
+        task: Name of a task, a class of one's own, or where that is: FILE.py:CLASS or MODULE:CLASS.
         num_envs: Number of simulations.
         threads: Number of threads; 0 for as many as there are processors.
         **settings: Fields of the task's Config.
@@ -32,7 +33,7 @@ class SandVectorEnv(VectorEnv[Observation, Action, NDArray[np.generic]]):
 
     metadata = {"autoreset_mode": AutoresetMode.SAME_STEP}  # noqa: RUF012, as Gymnasium has it
 
-    def __init__(self, task: str, num_envs: int = 1, threads: int = 0, **settings: Any) -> None:
+    def __init__(self, task: "str | type[Task]", num_envs: int = 1, threads: int = 0, **settings: Any) -> None:
         if num_envs < 1 or threads < 0:
             raise ValueError(f"num_envs must be at least 1 and threads 0, not {num_envs} and {threads}")
         self.task, self.num_envs = tasks.make(task, settings), num_envs

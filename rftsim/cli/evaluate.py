@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 
 MOST_EPISODES = 10_000
 """Most episodes on a ground, which are simulated side by side."""
-NUMBERS = {"speed": "speed [m/s]", "cost_of_transport": "CoT", "early": "early [%]"}
-"""Headings of what is printed beside the return, by name."""
+NUMBERS = {"speed": "speed [m/s]", "error": "off by [m/s]", "cost_of_transport": "CoT", "early": "early [%]"}
+"""Headings of what is printed beside the return, where it is measured, by name."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -122,7 +122,9 @@ class Evaluate:
 
 def _name(plan: Any, group: Path, runs: int) -> str:
     seeds = f", {runs} runs" if runs > 1 else ""
-    return f"{plan.task} trained on {plan.settings['ground']} ({group.name}{seeds})"
+    from rftsim_envs.tasks import title
+
+    return f"{title(plan.task)} trained on {plan.settings['ground']} ({group.name}{seeds})"
 
 
 def _spread(one: "Score") -> str:
@@ -130,11 +132,14 @@ def _spread(one: "Score") -> str:
 
 
 def _grid(scores: "list[Score]", baseline: bool) -> list[list[str]]:
-    rows = [["ground", "return", *NUMBERS.values(), *(["random", "best open loop"] if baseline else [])]]
+    measured = [name for name in NUMBERS if not all(math.isnan(one.mean(name)) for one in scores)]
+    rows = [
+        ["ground", "return", *(NUMBERS[name] for name in measured), *(["random", "best open loop"] if baseline else [])]
+    ]
     for one in scores:
         if one.actor != "policy":
             continue
-        numbers = [100.0 * one.mean(name) if name == "early" else one.mean(name) for name in NUMBERS]
+        numbers = [100.0 * one.mean(name) if name == "early" else one.mean(name) for name in measured]
         others = {other.actor: other for other in scores if other.ground == one.ground}
         more = [_other(others.get(name)) for name in ("random", "open loop")] if baseline else []
         cells = ["-" if math.isnan(number) else f"{number:.3g}" for number in numbers]
@@ -167,6 +172,7 @@ def _report(one: "Score") -> dict[str, Any]:
         "return_mean": one.mean("r"),
         "return_std": one.std("r"),
         "speed_m_s": one.mean("speed"),
+        **({} if math.isnan(one.mean("error")) else {"error_m_s": one.mean("error")}),
         "cost_of_transport": one.mean("cost_of_transport"),
         "ended_early": one.mean("early"),
         "episodes": one.episodes,

@@ -37,7 +37,7 @@ class Play:
     """
 
     run: tyro.conf.Positional[str]
-    """A folder of `rftsim train`, or an environment: rftsim/NAME-v0 or NAME."""
+    """A folder of `rftsim train`, or an environment: rftsim/NAME-v0, NAME, or FILE.py:CLASS."""
     actions: Literal["policy", "zero", "random"] | None = None
     """Who acts: by default the policy of a folder, and random actions in an environment."""
     episodes: int = 1
@@ -68,7 +68,7 @@ class Play:
                 f"episodes must be at least 1, seed zero or more, and seconds positive, {LONGEST:g} at most"
             )
         folder = Folder(self.run)
-        plan = folder.plan() if folder.exists else make_plan(self.run)
+        plan = folder.plan() if folder.exists else make_plan(self.run, read_settings(self.set))
         who = self.actions or ("policy" if folder.exists else "random")
         if who == "policy" and not folder.exists:
             raise RftsimError(f"{self.run} is no folder of `rftsim train`: it has no policy")
@@ -85,7 +85,7 @@ class Play:
 
             found = list(play.play(env, maker, self.episodes, self.seed, seconds=self.seconds, watch=watch))
         paths = [path for path in (self.record, self.video, self.picture) if path]
-        name = plan.as_json()["env"]
+        name = plan.env
         if self.json:
             print_json({"env": name, "actions": who, "episodes": found, "written": [str(path) for path in paths]})
             return

@@ -2,6 +2,7 @@
 
 import contextlib
 import dataclasses
+import math
 import signal
 import sys
 from collections.abc import Callable, Iterator, Mapping
@@ -20,6 +21,7 @@ from rftsim.errors import RftsimError
 if TYPE_CHECKING:
     from rftsim_envs.training.folder import Plan
     from rftsim_envs.training.ppo import Trained
+    from rftsim_envs.training.shows import Shows
 
 
 @dataclasses.dataclass(frozen=True)
@@ -30,10 +32,13 @@ class Train:
     killed goes on from its checkpoint when the same command is given again, with new episodes.
 
     Example: rftsim train FourFlapRunner --steps 500000 --out out/runner
+
+    A robot of one's own: rftsim train Locomotion --set model=unitree_go1/scene.xml --out out/go1
     """
 
     env: tyro.conf.Positional[str]
-    """rftsim/NAME-v0, or NAME."""
+    """rftsim/NAME-v0 or NAME; or a task of one's own, FILE.py:CLASS or MODULE:CLASS. Locomotion takes a robot of one's
+    own: --set model=PATH."""
     out: Path
     """Folder of the run."""
     algo: Literal["ppo"] = "ppo"
@@ -52,6 +57,9 @@ class Train:
     """Threads of the simulations; 0 for as many as there are processors."""
     tensorboard: bool = False
     """Write for TensorBoard, too, under OUT/tensorboard."""
+    watch: float | None = None
+    """Record an episode of the policy each time that so many seconds have passed, and at the end, for Rerun, to
+    OUT/watch/STEPS.rrd."""
     seeds: str | None = None
     """Several runs, 0,1,2: each in OUT/seed-N, one after the other or on Ray."""
     vary: Settings = ()
@@ -70,6 +78,8 @@ class Train:
         if self.tensorboard:
             with needing("tensorboard"):
                 import tensorboard  # noqa: F401
+        if self.watch is not None and not (math.isfinite(self.watch) and self.watch >= 0.0):
+            raise RftsimError(f"watch takes seconds, zero or more, not {self.watch:g}")
         changes: dict[str, Any] = read_settings(self.hyper)
         changes |= {"steps": self.steps} if self.steps is not None else {}
         changes |= {"n_envs": self.envs} if self.envs is not None else {}
@@ -89,27 +99,45 @@ class Train:
             sys.exit(130)
 
     def _train_here(self, plans: "dict[str, Plan]") -> "dict[str, Trained]":
-        from rftsim_envs.training.ppo import train
-
         found = {}
         with interruptible() as stop:
             for name, plan in plans.items():
-                with showing(name or plan.task, plan.training.steps, self.json) as report:
-                    found[name] = train(
-                        plan,
-                        self.out / name,
-                        threads=self.threads,
-                        tensorboard=self.tensorboard,
-                        report=report,
-                        stop=stop,
-                    )
+                found[name] = self._train_one(name, plan, stop)
                 if stop():
                     break
         return found
 
+    def _train_one(self, name: str, plan: "Plan", stop: Callable[[], bool]) -> "Trained":
+        from rftsim_envs.tasks import title
+        from rftsim_envs.training.ppo import train
+
+        out = self.out / name
+        shows = self._shows(plan, out)
+        with showing(name or title(plan.task), plan.training.steps, self.json) as report:
+
+            def reports(row: Mapping[str, Any]) -> None:
+                report(row)
+                if shows:
+                    shows(row)
+
+            trained = train(plan, out, threads=self.threads, tensorboard=self.tensorboard, report=reports, stop=stop)
+        if shows and trained.done:
+            shows.record(trained.steps)
+        return trained
+
+    def _shows(self, plan: "Plan", out: Path) -> "Shows | None":
+        """Whoever records the policy while it is trained, if that was asked for and is still to be trained."""
+        from rftsim_envs.training.folder import Folder
+
+        if self.watch is None or Folder(out).done:
+            return None
+        with needing("rerun"):
+            from rftsim_envs.training.shows import Shows
+        return Shows(plan, out, self.watch)
+
     def _train_on_ray(self, plans: "dict[str, Plan]", address: str) -> "dict[str, Trained]":
-        if self.tensorboard or self.threads:
-            raise RftsimError("runs on Ray have one thread each and do not write for TensorBoard")
+        if self.tensorboard or self.threads or self.watch is not None:
+            raise RftsimError("runs on Ray have one thread each, do not write for TensorBoard and are not watched")
         from rftsim_envs.training.campaign import train_all
 
         with needing("ray"), Progress(console=Console(stderr=True), disable=is_quiet(self.json)) as bar:

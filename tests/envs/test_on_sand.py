@@ -203,6 +203,13 @@ def test_gymnasium_finds_nothing_to_complain_of():
     check_env(rftsim_envs.on_sand("Hopper-v5").unwrapped, skip_render_check=True)
 
 
+@pytest.mark.filterwarnings("ignore:.*We recommend you to use a symmetric and normalized Box action space")
+@pytest.mark.parametrize("env_id", LEGGED)
+def test_sb3_finds_nothing_to_complain_of(env_id):
+    checker = pytest.importorskip("stable_baselines3.common.env_checker")
+    checker.check_env(rftsim_envs.on_sand(env_id).unwrapped)
+
+
 def test_an_explicit_force_leaves_the_integrator():
     integrators = [
         rftsim_envs.on_sand("Hopper-v5", force=force).unwrapped.model.opt.integrator

@@ -3,10 +3,16 @@
 import numpy as np
 import pytest
 from rftsim_envs import ConfigError, SandEnv, SandVectorEnv
+from rftsim_envs.four_flap_runner import ROLL, RUNNER, SWAY
 from rftsim_envs.grouser_wheel import GROUSER_WHEEL, RADIUS, slip, tracking
-from rftsim_envs.quadruped import Quadruped, closeness
+from rftsim_envs.quadruped import Quadruped
 from rftsim_envs.rover import BURIED, Rover, digging, progress
 from rftsim_envs.rover import RADIUS as ROVER_RADIUS
+from rftsim_envs.walking import closeness
+
+from rftsim import wrenches
+from rftsim.run.run import run as simulate
+from rftsim.run.scenes import stage
 
 GROUNDS = ("sand", "rigid")
 
@@ -170,3 +176,34 @@ def test_wheel_start_is_at_rest_on_its_lugs():
     env.reset(seed=0)
     assert env.data.body("wheel").xpos[2] == pytest.approx(RADIUS)
     np.testing.assert_array_equal(env.data.qvel, 0.0)
+
+
+def test_runner_at_a_steady_rate_slips_as_in_its_scene():
+    """Of a turn's way, by the angle that was turned: the scene has its rate to the digit and every triangle."""
+    env = SandEnv("FourFlapRunner", duration=10.0)
+    env.reset(seed=1)
+    places = []
+    for k in range(300):
+        env.step([(2.0 * np.pi - ROLL) / SWAY])
+        if k in (199, 299):
+            places.append(env.data.qpos.copy())
+    (start, _, first), (end, _, last) = places
+    slip = 1.0 - (end - start) / (RUNNER.outer_radius * (last - first))
+    scene = {"law": env.config.law, "sand": env.config.sand, "settings": {"rpm": "60"}}
+    there = simulate(stage("four-flap-runner", timestep=2e-3, duration=5.0, **scene)).steady.slip
+    assert slip == pytest.approx(there, abs=0.02 * (1.0 - there))
+
+
+def test_drive_and_push_pay_for_the_sand():
+    """Of a wheel that rolls steadily nothing is stored: drive + push + sand = 0 in the mean."""
+    env = SandEnv("GrouserWheel", speed=(0.3, 0.3), duration=10.0)
+    seen, _ = env.reset(seed=0)
+    powers = []
+    for k in range(400):
+        seen, *_ = env.step([0.3 + 1.5 * seen[1] - 0.1 * seen[5]])
+        if k >= 150:
+            paid = float(env.data.actuator_force @ env.data.actuator_velocity)
+            powers.append((paid, wrenches(env.model, env.data).power.sum()))
+    paid, sand = np.mean(powers, axis=0)
+    assert paid > 0.3
+    assert paid == pytest.approx(-sand, rel=0.03)

@@ -19,7 +19,7 @@ from rftsim_envs import tasks, watch
 from rftsim_envs.env import SandEnv
 from rftsim_envs.recipe import Training, TrainingError
 from rftsim_envs.sb3 import SandVecEnv
-from rftsim_envs.training import actors, evaluate, folder, ppo
+from rftsim_envs.training import actors, evaluate, folder, network, ppo
 from rftsim_envs.training.folder import Folder, make_plan
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import DummyVecEnv
@@ -477,3 +477,58 @@ def test_episodes_that_cannot_be_played_are_refused(capsys, change, words):
     assert (code, out) == (2, "")
     assert len(err.splitlines()) == 1
     assert words in err
+
+
+def test_normalised_observations_are_kept_in_the_policy(tmp_path):
+    """Mean and spread of all that was collected; a stopped run goes on with them, and its policy plays with them."""
+    plan, calls = make_plan(TASK, SHORT, TINY | {"normalise": True}), []
+    seen = []
+
+    def stop():
+        calls.append(1)
+        return len(calls) == 80
+
+    learn = network.Normalising.learn
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(network.Normalising, "learn", lambda eye, told: (seen.append(told.copy()), learn(eye, told)))
+        assert ppo.train(plan, tmp_path, stop=stop) == (248, 0, False)
+        assert ppo.train(plan, tmp_path) == (500, 248, True)
+    kept, seen = parameters(tmp_path / "policy.zip"), [one.astype(float) for one in seen]
+    np.testing.assert_allclose(kept["features_extractor.mean"], np.mean(np.vstack(seen), axis=0), atol=1e-12)
+    np.testing.assert_allclose(kept["features_extractor.variance"], np.var(np.vstack(seen), axis=0), atol=1e-12)
+    assert kept["features_extractor.count"] == 500
+    env = SandEnv(TASK, **SHORT)
+    observation, _ = env.reset(seed=0)
+    action = PPO.load(tmp_path / "policy.zip", device="cpu").predict(observation, deterministic=True)[0]
+    np.testing.assert_array_equal(actors.trained(Folder(tmp_path))(env.episodes)(observation[None], 0.0)[0], action)
+
+
+def test_a_policy_with_a_past_is_trained_and_scored(tmp_path, capsys):
+    plan = make_plan(TASK, SHORT | {"history": 3, "observe_ground": True}, TINY)
+    ppo.train(plan, tmp_path)
+    code, out, _ = call(capsys, "evaluate", tmp_path, "--episodes", 2, "--on", "sand,dunes", "--json")
+    assert (code, len(json.loads(out)[str(tmp_path)])) == (0, 2)
+
+
+@pytest.mark.slow
+def test_scores_on_ray_are_those_of_here(finished, capsys):
+    """`evaluate --ray` gives, ground by ground, the numbers of the same command without it."""
+    pytest.importorskip("ray")
+    arguments = ("evaluate", finished, "--on", "sand,rigid", "--episodes", 2, "--baseline", "--json")
+    code, out, _ = call(capsys, *arguments, "--ray", "local")
+    assert code == 0
+    assert json.loads(out) == json.loads(call(capsys, *arguments)[1])
+
+
+def test_a_run_is_watched_while_it_is_trained(tmp_path, capsys):
+    """After each update where no time has to pass: an episode of the policy, and at the end that of the final one."""
+    pytest.importorskip("rerun")
+    arguments = ["train", TASK, "--out", tmp_path, "--set", "duration=0.3", "--envs", 4, "--steps", 256]
+    arguments += ["--hyper", "n_steps=32", "batch_size=32", "n_epochs=1", "layers=8"]
+    assert call(capsys, *arguments, "--watch", 0)[0] == 0
+    assert [path.name for path in sorted((tmp_path / "watch").iterdir())] == ["000000128.rrd", "000000256.rrd"]
+    assert len(read(tmp_path / "watch/000000256.rrd", "/motion/speed")) == STEPS
+    code, _, err = call(capsys, *arguments, "--watch", -1)
+    assert (code, "watch takes seconds, zero or more" in err) == (2, True)
+    code, _, err = call(capsys, *arguments, "--watch", 1, "--ray", "local")
+    assert (code, "are not watched" in " ".join(err.split())) == (2, True)

@@ -14,6 +14,7 @@ from rftsim_envs.env import spaces
 from rftsim_envs.episodes import Episodes, Observation
 from rftsim_envs.recipe import Drive, TrainingError
 from rftsim_envs.training.folder import Folder
+from rftsim_envs.training.network import network
 
 Actor = Callable[[Observation, float], NDArray[Any]]
 """Actions (n, naction) as a function of what is seen, (n, nobservation), and the time since the start [s]."""
@@ -29,9 +30,7 @@ def trained(folder: Folder) -> Maker:
     training = folder.plan().training
 
     def make(episodes: Episodes) -> Actor:
-        policy = ActorCriticPolicy(
-            *spaces(episodes), ConstantSchedule(0.0), list(training.layers), log_std_init=training.log_std_init
-        )
+        policy = ActorCriticPolicy(*spaces(episodes), ConstantSchedule(0.0), **network(training))
         try:
             _, parameters, _ = load_from_zip_file(str(path), device="cpu", load_data=False)
             policy.load_state_dict(dict(parameters["policy"]))

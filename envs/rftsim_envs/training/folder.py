@@ -11,6 +11,7 @@ import contextlib
 import csv
 import dataclasses
 import fcntl
+import hashlib
 import importlib.metadata
 import json
 import os
@@ -26,6 +27,8 @@ from rftsim_envs import tasks
 from rftsim_envs.recipe import Training, TrainingError
 
 ALGORITHMS: Final = ("ppo",)
+DIGITS: Final = 12
+"""Number of digits of a file's digest."""
 PACKAGES: Final = ("rftsim", "mujoco", "stable-baselines3", "torch", "numpy")
 
 
@@ -34,7 +37,7 @@ class Plan:
     """A training run as it is asked for, every default resolved.
 
     Attributes:
-        task: Name of one of `rftsim_envs.TASKS`.
+        task: The task's reference, see `rftsim_envs.tasks.reference`.
         settings: Every field of the task's Config.
         training: Settings of PPO.
         seed: Seed of everything that is drawn.
@@ -47,12 +50,17 @@ class Plan:
     seed: int = 0
     algo: str = "ppo"
 
+    @property
+    def env(self) -> str:
+        """The id of its environment, or the reference of a task of one's own."""
+        return self.task if ":" in self.task else f"rftsim/{self.task}-v0"
+
     def as_json(self) -> dict[str, Any]:
         """The plan as config.json has it."""
         plain: dict[str, Any] = json.loads(
             json.dumps(
                 {
-                    "env": f"rftsim/{self.task}-v0",
+                    "env": self.env,
                     "settings": self.settings,
                     "sand": dataclasses.asdict(make_sand(self.settings["sand"])),
                     "algo": self.algo,
@@ -75,7 +83,7 @@ def make_plan(
     """Make a plan from what differs from the defaults.
 
     Args:
-        env: `rftsim/NAME-v0`, or NAME.
+        env: `rftsim/NAME-v0`, NAME, FILE.py:CLASS or MODULE:CLASS, see `rftsim_envs.tasks.find`.
         settings: Settings of the task that differ from its own.
         changes: Settings of the training that differ from the task's.
         seed: Seed of everything that is drawn.
@@ -89,14 +97,10 @@ def make_plan(
         raise TrainingError(f"no algorithm {algo!r}; algorithms are {', '.join(ALGORITHMS)}")
     if seed < 0:
         raise TrainingError(f"seed must be zero or more, not {seed}")
-    task = tasks.make(name_of(env), dict(settings or {}))
+    name = tasks.reference(env)
+    task = tasks.make(name, dict(settings or {}))
     training = task.training.replace(changes or {})
-    return Plan(task=name_of(env), settings=dataclasses.asdict(task.config), training=training, seed=seed, algo=algo)
-
-
-def name_of(env: str) -> str:
-    """Name of the task that is given as `rftsim/NAME-v0` or as NAME."""
-    return env.removeprefix("rftsim/").removesuffix("-v0")
+    return Plan(task=name, settings=dataclasses.asdict(task.config), training=training, seed=seed, algo=algo)
 
 
 class Folder:
@@ -132,7 +136,11 @@ class Folder:
         try:
             settings, training = dict(kept["settings"]), Training(**kept["training"])
             return Plan(
-                task=name_of(kept["env"]), settings=settings, training=training, seed=kept["seed"], algo=kept["algo"]
+                task=tasks.reference(kept["env"]),
+                settings=settings,
+                training=training,
+                seed=kept["seed"],
+                algo=kept["algo"],
             )
         except (KeyError, TypeError) as error:
             raise TrainingError(f"{self.config} is not that of a training run: {error}") from error
@@ -188,19 +196,26 @@ class Folder:
         ]
         if differing:
             raise TrainingError(f"{self.path} holds another run: {'; '.join(differing)}. Take another folder.")
-        if not kept["done"] and kept.get("versions") != versions():
-            changes = [f"{name} {there} to {here}" for name, there, here in _differences(kept["versions"], versions())]
+        now = versions(plan)
+        if not kept["done"] and kept.get("versions") != now:
+            changes = [f"{name} {there} to {here}" for name, there, here in _differences(kept["versions"], now)]
             warnings.warn(f"versions changed since {self.path} was begun: {', '.join(changes)}", RftsimWarning, 2)
 
     def write_config(self, plan: Plan, *, done: bool) -> None:
         """Write config.json, which says whether the run is finished."""
-        text = json.dumps(plan.as_json() | {"versions": versions(), "done": done}, indent=2)
+        text = json.dumps(plan.as_json() | {"versions": versions(plan), "done": done}, indent=2)
         write_whole(self.config, f"{text}\n".encode())
 
 
-def versions() -> dict[str, str]:
-    """Versions of the packages on which a run's numbers depend, by name."""
-    return {name: importlib.metadata.version(name) for name in PACKAGES}
+def versions(plan: Plan) -> dict[str, str]:
+    """Versions of the packages, and digests of the user's own files, on which a run's numbers depend, by name.
+
+    Those files are that of the task, and those that settings name: a robot's model, or a sand.
+    """
+    named = [plan.task.rpartition(":")[0], *(value for value in plan.settings.values() if isinstance(value, str))]
+    files = {Path(name).name: Path(name) for name in named if name and Path(name).is_file()}
+    digests = {name: hashlib.sha256(path.read_bytes()).hexdigest()[:DIGITS] for name, path in files.items()}
+    return {name: importlib.metadata.version(name) for name in PACKAGES} | digests
 
 
 def _differences(there: Any, here: Any, name: str = "") -> Iterator[tuple[str, Any, Any]]:

@@ -11,15 +11,17 @@ from matplotlib import image
 from numpy.typing import NDArray
 
 from rftsim.view import film
-from rftsim.view.cameras import SIZE
+from rftsim.view.cameras import SIZE, framing
 from rftsim.view.drawing import ALL
 from rftsim.view.render import Pictures
-from rftsim_envs.env import SandEnv
+from rftsim_envs.env import FOLLOW, SandEnv, has_camera
 from rftsim_envs.tally import Tally
 from rftsim_envs.training.actors import Maker
 
 MOMENTS: Final = 4
 """Number of pictures in a strip."""
+STRIP: Final = (SIZE[0] // 2, SIZE[1])
+"""Width and height of each of them [pixels]."""
 
 
 def play(
@@ -62,7 +64,7 @@ def taking_strip(env: SandEnv, path: Path) -> Iterator[Callable[[Mapping[str, An
     Arrows are the sand's forces and tractions, and what is buried shows.
     """
     states: list[NDArray[np.float64]] = []
-    kept, model, camera = mujoco.mjtState.mjSTATE_INTEGRATION, env.model, "follow"
+    kept, model = mujoco.mjtState.mjSTATE_INTEGRATION, env.model
 
     def watch(info: Mapping[str, Any]) -> None:
         state = np.empty(mujoco.mj_stateSize(model, kept))
@@ -71,11 +73,13 @@ def taking_strip(env: SandEnv, path: Path) -> Iterator[Callable[[Mapping[str, An
 
     yield watch
     data, pictures = mujoco.MjData(model), []
-    with Pictures(model, SIZE[0] // 2, SIZE[1], ALL) as taker:
+    with Pictures(model, *STRIP, ALL) as taker:
         for k in np.linspace(0, len(states) - 1, MOMENTS).round().astype(int):
             mujoco.mj_setState(model, data, states[k], kept)
             mujoco.mj_forward(model, data)
-            pictures.append(taker.take(data, camera))
+            pictures.append(
+                taker.take(data, FOLLOW if has_camera(model) else framing(model, data, STRIP[0] / STRIP[1]))
+            )
     image.imsave(path, np.hstack(pictures))
 
 

@@ -21,6 +21,7 @@ from stable_baselines3.common.utils import ConstantSchedule
 from rftsim_envs.recipe import Training, TrainingError
 from rftsim_envs.sb3 import SandVecEnv
 from rftsim_envs.training.folder import Folder, Plan, Progress, write_whole
+from rftsim_envs.training.network import Normalising, network
 
 EVERY_SECONDS: Final = 5.0
 """Time after which an update is followed by a checkpoint [s]."""
@@ -108,7 +109,7 @@ def make_model(training: Training, env: SandVecEnv, seed: int) -> PPO:
         ent_coef=training.ent_coef,
         vf_coef=training.vf_coef,
         max_grad_norm=training.max_grad_norm,
-        policy_kwargs={"net_arch": list(training.layers), "log_std_init": training.log_std_init},
+        policy_kwargs=network(training),
         seed=seed,
         device="cpu",
     )
@@ -165,6 +166,7 @@ class _Run:
         self.model.learn(n * self.env.num_envs, self._callback, NEVER, reset_num_timesteps=False)
         if self._callback.stopped:
             return False
+        self._normalise()
         self.updates, self.steps = self.updates + 1, self.steps + n * self.env.num_envs
         took = time.monotonic() - began
         self._spent += took
@@ -186,6 +188,12 @@ class _Run:
             self.model.logger.record(f"episode/{name}", float(value))
         self.model.dump_logs()
         return True
+
+    def _normalise(self) -> None:
+        """Let the network learn what is usual to see, once an update has compared with the policy that collected."""
+        eye = self.model.policy.features_extractor
+        if isinstance(eye, Normalising):
+            eye.learn(self.model.rollout_buffer.observations.reshape(-1, eye.features_dim))
 
     def save_sometimes(self) -> None:
         when, where = self._saved
