@@ -1,7 +1,7 @@
 """Sand that remembers: when a step ends, what bodies have swept is marked in the ruts, and what is too steep slides.
 
 The ruts are part of MuJoCo's plugin_state, see `layout.RUTS`: so they are copied, pickled and reset with the mjData.
-A body's marks are made when it can have moved by a part of a cell, and when it begins to rise; while sand slides, it is
+A body's marks are made when it can have moved by a part of a cell, and when it begins to rise; what slides elsewhere is
 looked at in intervals of SLIDING.
 """
 
@@ -23,8 +23,8 @@ PART: Final = 1.0
 """How far a body may move before its marks are made [cells]."""
 LEAST: Final = 0.02
 """How far it must have moved for marks to be made when it begins to rise [cells]."""
-SLIDING: Final = 0.01
-"""Time between two goes at sand that slides [s]."""
+SLIDING: Final = 0.02
+"""Time between two goes at sand that slides where nothing moves [s]."""
 MARGIN: Final = 4
 """Cells about what bodies cover that are looked at."""
 _TABLE: Final = patch.TABLE
@@ -51,12 +51,12 @@ def _choose(model, m, t, address, marks, h, boxes):
     Or what slides about one is due.
     """
     head, is_due, slides_on = ruts.ruts_at(instance.ruts(address)), False, False
+    head.clock += h
     for k in range(len(boxes)):
         moves = _move_on(model, m, t, address, k, marks, h)
         boxes[k, 0] = 1.0 if moves else 0.0
         is_due = is_due or moves
         slides_on = slides_on or not covers.is_empty(instance.trace(address, k).unsettled)
-    head.clock += h
     return is_due or (slides_on and head.clock >= SLIDING)
 
 
@@ -147,10 +147,10 @@ def _recentre(model, m, t, address, field, marks):
 
 
 @exact
-def _gather(model, m, t, address, field, marks, boxes):
+def _gather(model, m, t, address, field, marks, slides_all, boxes):
     """Fill the boxes, (n, 4), with the cells to look at about each body: what it covers, if it moved, and what slides.
 
-    Those that overlap are joined.
+    Those that overlap are joined. Where a body did not move, nothing slides unless all is to.
     """
     own = doubles(stack_doubles(4), 4)
     for k in range(len(boxes)):
@@ -162,21 +162,23 @@ def _gather(model, m, t, address, field, marks, boxes):
             covers.empty(own)
             if covers.add_body(t, body, surface, field, marks, own):
                 covers.add_prints(t, body, surface, field, marks, boxes[k])
-        covers.join(boxes[k], trace.unsettled)
-        covers.empty(trace.unsettled)
+        if moves or slides_all:
+            covers.join(boxes[k], trace.unsettled)
+            covers.empty(trace.unsettled)
     covers.merge(boxes)
 
 
 @exact
-def _look(model, m, t, address, sand, boxes):
+def _look(model, m, t, address, sand, boxes, h):
     """Mark what was swept since the ruts were looked at, and let sand slide."""
     at, bed = instance.ruts(address), fields.sand_at(sand).bed
     head, marks, field = ruts.ruts_at(at), ruts.marks_of(bed, at), fields.field_of(sand, False)
-    passed, head.clock = head.clock, 0.0
+    slides_all = head.clock >= SLIDING
+    passed, head.clock = (head.clock, 0.0) if slides_all else (h, head.clock)
     if _recentre(model, m, t, address, field, marks):
         marks = ruts.marks_of(bed, at)
         _average(marks)
-    _gather(model, m, t, address, field, marks, boxes)
+    _gather(model, m, t, address, field, marks, slides_all, boxes)
     for k in range(len(boxes)):
         if not covers.is_empty(boxes[k]):
             head.moved += _work(model, m, t, address, field, marks, boxes[k], bed_at(bed).mu_int, passed)
@@ -197,5 +199,5 @@ def remember(model, data, m, d, number):
         return
     boxes = matrix(memory, n, 4)
     if _choose(model, m, t, address, marks, h, boxes):
-        _look(model, m, t, address, sand, boxes)
+        _look(model, m, t, address, sand, boxes, h)
     release(memory)

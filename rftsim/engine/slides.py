@@ -16,7 +16,7 @@ from rftsim.machine.memory import peek, poke
 
 RATE: Final = 800.0
 """Passes over a patch per second, as far as it was not looked at before; what is not at rest then goes on sliding."""
-MOST: Final = 8
+MOST: Final = 16
 """Passes in one go."""
 SHARE: Final = 0.15
 """Share of what is too much that moves over an edge in a pass; with more than a sixth, stripes of cells would grow."""

@@ -22,9 +22,9 @@ class Ground:
     """The free surface of a bed, ruts and all, as it was when this was made.
 
     Attributes:
-        plane: The plane of a bed without a terrain, else None. spacing: Distance between the values that are known
-        along x and along y [m]: of the ruts, or of the terrain where
-            there are none; None of a plane without ruts.
+        plane: The plane of a bed without a terrain, else None.
+        spacing: Distance between the values that are known, along x and along y [m]: of the ruts, or of the terrain
+            where there are none; None of a plane without ruts.
         window: Where ruts are remembered; else the values of the terrain; None of a plane without ruts.
         displaced: Volume of sand that was displaced so far [m^3].
         left: Volume by which what was left behind the window lies above the free surface [m^3].
