@@ -154,7 +154,7 @@ class Moment(NamedTuple):
 class Task(abc.ABC):
     """A robot on a ground, and what is asked of it.
 
-    A task holds no state of an episode: its methods take `Moment`s of n simulations and return arrays (n, ...).
+    A task holds no state of an episode: its methods take a `Moment` of n simulations and return arrays (n, ...).
 
     Attributes:
         Settings: Class of its configuration.
