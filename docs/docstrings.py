@@ -1,4 +1,4 @@
-"""Docstrings as the pages need them: tables in Markdown, bars of absolute values, and colons in what is said of fields."""
+"""Docstrings as the pages need them: tables in Markdown, bars of absolute values, colons in what fields say."""
 
 import re
 from typing import Any
