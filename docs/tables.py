@@ -17,10 +17,13 @@ import time
 from pathlib import Path
 
 FOLDER = Path(__file__).parent / "tables"
-COLUMNS = "110"
+COLUMNS = "100"
 """Width that the commands print for."""
 STUDIES = ("wheel", "runner", "plates", "measured", "scaling", "drill", "continuum", "motion", "slope", "ruts")
 CHEAP = {
+    "help-rftsim.txt": "rftsim --help",
+    "help-run.txt": "rftsim run --help",
+    "help-rftsim-mpm.txt": "rftsim-mpm --help",
     "inspect-wheel.txt": "rftsim inspect grouser-wheel --law rft3d --set rpm=20",
     "presets.md": "python docs/presets.py",
     "kernel.txt": "rftsim bench kernel",

@@ -1,9 +1,11 @@
 """`rftsim`: every command, and how its errors end."""
 
+import importlib.metadata
 import sys
 import warnings
 from typing import Final
 
+import mujoco
 from rich.console import Console
 from rich.markup import escape
 
@@ -49,13 +51,16 @@ def main(arguments: list[str] | None = None) -> None:
 
     It exits with 2 where its input cannot be, with 130 after Ctrl-C, and with 141 where nobody reads what it prints.
     """
-    console = Console(stderr=True)
+    console, given = Console(stderr=True), sys.argv[1:] if arguments is None else arguments
     with terminable(), unlogged(), warnings.catch_warnings(record=True) as caught:
         for kind in (RftsimNote, RftsimWarning):
             warnings.simplefilter("always", kind)
         try:
             with piped():
-                command = parsed(lambda: read("rftsim", COMMANDS, sys.argv[1:] if arguments is None else arguments))
+                if given == ["--version"]:
+                    print(f"rftsim {importlib.metadata.version('rftsim')}, MuJoCo {mujoco.__version__}")
+                    return
+                command = parsed(lambda: read("rftsim", COMMANDS, given))
                 command(lambda: texts_of(caught, RftsimWarning))
         except KeyboardInterrupt:
             print_line(console, "stopped")
