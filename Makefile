@@ -9,7 +9,7 @@ MUJOCO_LOWEST := 3.5.0
 MUJOCO_NEWEST := 4.0.0
 export MUJOCO_GL ?= egl
 
-.PHONY: demo test check unit readme native docs tables pictures wheel test-slow test-mujoco clean
+.PHONY: demo test check unit readme native docs tables pictures notebooks wheel test-slow test-mujoco clean
 
 demo: $(VENV)/run
 	$(BIN)/rftsim demo
@@ -32,7 +32,7 @@ readme: $(VENV)/ready
 native: $(VENV)/ready
 	$(BIN)/python -P rftsim/machine/build.py
 
-# The pages, into out/docs; the tables that commands print for them, and their pictures.
+# The pages, into out/docs; the tables that commands print for them, their pictures and notebooks.
 docs: $(VENV)/ready
 	$(BIN)/sphinx-build -q -W --keep-going -b html docs out/docs
 
@@ -41,6 +41,9 @@ tables: $(VENV)/ready
 
 pictures: $(VENV)/ready
 	$(BIN)/python docs/gallery.py
+
+notebooks: $(VENV)/ready
+	$(BIN)/python docs/notebooks.py
 
 wheel: $(VENV)/ready
 	$(BIN)/hatchling build -d dist

@@ -11,11 +11,12 @@ sys.path.insert(0, str(Path(__file__).parent))
 project = PROJECT["name"]
 release = version = PROJECT["version"]
 copyright = "2026, the rftsim authors"
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_copybutton", "docstrings"]
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_copybutton", "docstrings"]
 exclude_patterns = ["tables"]
 
 default_role = "code"
 highlight_language = "none"
+nb_execution_mode = "off"  # `make notebooks` runs them, and a test
 myst_heading_anchors = 4
 copybutton_prompt_text = "$ "
 

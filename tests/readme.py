@@ -20,7 +20,7 @@ import rftsim
 ROOT = Path(__file__).parents[1]
 ELSEWHERE = {"adding_a_law.md"}
 """Pages whose blocks a test of their own runs."""
-UNRUN = re.compile(r"rftsim view|rftsim-mpm|out/train|--data DIR|plates\.csv|my_sand\.toml|/tmp/")
+UNRUN = re.compile(r"rftsim view|rftsim-mpm|out/train|--data DIR|plates\.csv|my_sand\.toml|drill\.stl|/tmp/")
 """Commands that need a display, measured data or hours, and those of the continuum, which tests/mpm calls."""
 SHORTENED = {
     "train": "--steps 2048",

@@ -41,7 +41,7 @@ def read(program: str, group: Group, words: Sequence[str]) -> Any:
 def _listed(name: str, one: "Callable[..., Any] | Group") -> Any:
     """A command as an overview has it: the first paragraph of its docstring."""
     if isinstance(one, Group):
-        return Annotated[_Further, tyro.conf.subcommand(name, description=one.says)]
+        return Annotated[_Further, tyro.conf.subcommand(name, description=one.says.split("\n\n")[0])]
     says = " ".join((one.__doc__ or "").split("\n\n")[0].split())
     return Annotated[one, tyro.conf.subcommand(name, description=says)]
 
