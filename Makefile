@@ -9,7 +9,7 @@ MUJOCO_LOWEST := 3.5.0
 MUJOCO_NEWEST := 4.0.0
 export MUJOCO_GL ?= egl
 
-.PHONY: demo test check unit readme native test-slow test-mujoco clean
+.PHONY: demo test check unit readme native docs tables pictures notebooks wheel test-slow test-mujoco clean
 
 demo: $(VENV)/run
 	$(BIN)/rftsim demo
@@ -31,6 +31,22 @@ readme: $(VENV)/ready
 # The machine code that ships, after an edit of what is compiled.
 native: $(VENV)/ready
 	$(BIN)/python -P rftsim/machine/build.py
+
+# The pages, into out/docs; the tables that commands print for them, their pictures and notebooks.
+docs: $(VENV)/ready
+	$(BIN)/sphinx-build -q -W --keep-going -b html docs out/docs
+
+tables: $(VENV)/ready
+	$(BIN)/python docs/tables.py
+
+pictures: $(VENV)/ready
+	$(BIN)/python docs/gallery.py
+
+notebooks: $(VENV)/ready
+	$(BIN)/python docs/notebooks.py
+
+wheel: $(VENV)/ready
+	$(BIN)/hatchling build -d dist
 
 test-slow: $(VENV)/ready
 	$(BIN)/pytest -m slow

@@ -161,7 +161,7 @@ class Moment(NamedTuple):
 class Task(abc.ABC):
     """A robot on a ground, and what is asked of it.
 
-    A task holds no state of an episode: its methods take `Moment`s of n simulations and return arrays (n, ...).
+    A task holds no state of an episode: its methods take a `Moment` of n simulations and return arrays (n, ...).
 
     One of one's own inherits this class, states `length` and `naction`, and has the methods below that are abstract.
     Where it has settings of its own, `Settings` is a frozen dataclass that inherits `Config`, with keywords alone. It

@@ -1,1 +1,1 @@
-"""The granular continuum by the material point method; knows nothing of rftsim. Nothing yet."""
+"""The granular continuum by the material point method; knows nothing of rftsim."""

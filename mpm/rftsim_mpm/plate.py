@@ -28,13 +28,13 @@ class Plate:
     """One plate, its motion and its sand; SI and degrees."""
 
     dim: int = 2
-    """2 for plane strain (forces per metre of width), 3 for a square plate."""
+    """2: plane strain, N/m; 3: a square plate, N."""
     beta: float = 0.0
     """Tilt of the plate [deg]."""
     gamma: float = 90.0
-    """Direction of motion: 0 horizontal, 90 straight down, negative upward [deg]."""
+    """Motion: 0 level, 90 down, negative up [deg]."""
     psi: float = 0.0
-    """Azimuth of the plate's normal from the direction of motion, in 3D [deg]."""
+    """Azimuth of its normal from the motion [deg]."""
     mu_int: float = 0.4
     """Internal friction of the sand [-]."""
     mu_surf: float = 0.35
@@ -42,35 +42,35 @@ class Plate:
     rho: float = 1512.0
     """Critical density of the sand [kg/m^3]."""
     length: float = 0.05
-    """Length (and in 3D width) of the plate [m]."""
+    """Length, and in 3D width [m]."""
     thickness: float | None = None
-    """Thickness of the plate [m]; by default 0.3 of the length in the plane, 0.2 in space."""
+    """Thickness; by default 0.3 lengths, in 3D 0.2 [m]."""
     depth: float | None = None
-    """Depth of the leading face's centre at which the force is read [m]; by default 0.4 of the length."""
+    """Depth of the reading; by default 0.4 lengths [m]."""
     speed: float = 0.1
     """Speed of the plate [m/s]."""
     buried: float = 0.6
-    """Travel before the reading of a plate that starts in the sand [plate lengths]."""
+    """Travel where it starts in the sand [lengths]."""
     cells: float = 10.0
     """Cells per plate length."""
     young: float | None = None
-    """Young's modulus [Pa]; by default from `softness`."""
+    """Young's modulus; by default by softness [Pa]."""
     softness: float = 0.005
-    """Strain of the sand under the bearing pressure of the reading's depth, rho g z N_q / E."""
+    """Strain of the sand, rho g z N_q / E."""
     courant: float = 0.3
     """Time step, in cells per wave."""
     shift: float = 0.0
-    """Place of the plate on the grid, along x and y [cells]."""
+    """Place on the grid, along x and y [cells]."""
     early: float = 0.0
-    """How far outside its surface the plate acts [cells]; 1 is what raw contact of two velocity fields does."""
+    """How far outside its surface it acts [cells]."""
     bed: float = 1.0
-    """Factor on the margins of sand around the plate."""
+    """Factor on the sand around the plate."""
     ppc: int = 2
     """Particles per cell along each axis."""
     xpic: int = 0
     """Order of XPIC; 0 is FLIP."""
     symmetric: bool = True
-    """In 3D, model a half or a quarter where the rest is its mirror image."""
+    """In 3D, model half or a quarter if that serves."""
 
     def __post_init__(self) -> None:
         if self.dim not in (2, 3):

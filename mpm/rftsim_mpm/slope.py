@@ -24,16 +24,16 @@ GRAVITY = 9.81
 
 @dataclasses.dataclass(frozen=True)
 class Slope(Plate):
-    """One plate, its motion and its sand on a slope; SI and degrees, the plate's from the surface."""
+    """One plate that moves in a slope; SI and degrees, from the surface."""
 
     slope: float = 20.0
-    """Angle by which the surface falls along the motion: positive downhill, negative uphill [deg]."""
+    """Fall of the surface along the motion [deg]."""
     mu_int: float = 0.5
-    """Internal friction of the sand, above the tangent of the slope [-]."""
+    """Friction of the sand, above the slope [-]."""
     depth: float | None = 0.04
-    """Depth of the leading face's centre at which the force is read, along the surface's normal [m]."""
+    """Depth of the reading, along the normal [m]."""
     softness: float = 0.01
-    """Strain of the sand under the bearing pressure of the reading's depth, rho g z N_q / E."""
+    """Strain of the sand, rho g z N_q / E."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -38,7 +38,7 @@ class Wheel:
     width: float = 0.006
     """Width of a grouser, along the rim [m]."""
     breadth: float = 0.14
-    """Breadth of the wheel [m]; masses and forces are divided by it."""
+    """Breadth, by which masses and forces are divided [m]."""
     mass_x: float = 23.0
     """Inertia along [kg]."""
     mass_z: float = 6.3
@@ -50,7 +50,7 @@ class Wheel:
     mu_surf: float = 0.35
     """Friction between sand and wheel [-]."""
     rho: float = 638.0
-    """Critical density of the sand, 1100 x 0.58 [kg/m^3]."""
+    """Critical density of the sand [kg/m^3]."""
     dx: float = 0.004
     """Size of a cell [m]; a grouser must be more than a cell wide."""
     xpic: int = 0

@@ -3,11 +3,12 @@
 import dataclasses
 from collections.abc import Callable
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 import tyro
 
 from rftsim.cli.costs import compare_speeds, time_environment, time_kernel
+from rftsim.cli.options import Count, Flag, Folder, Kept
 from rftsim.cli.solver import weigh_solver
 from rftsim.cli.stability import play_hard_cases
 from rftsim.cli.terrain import time_terrain
@@ -17,45 +18,38 @@ from rftsim.cli.terrain import time_terrain
 class Bench:
     """Measure rftsim itself: its stability, its cost, and the accuracy that speed costs.
 
-    stability: the hard cases (rest, light legs, stiff servos, impacts, edges, constraints) at time steps from 0.1 to
-    10 ms with the implicit and the explicit force, against the exact or converged answer.
+    stability: hard cases at time steps from 0.1 to 10 ms, with both forces, against the exact answer.
 
-    environment: the time that sand adds to MuJoCo's step, in one simulation and in 256 side by side: shipped robots,
-    free spheres, and robots of others where they are installed (gymnasium, dm_control, MENAGERIE_ROOT).
+    environment: the time that sand adds to MuJoCo's step, of shipped robots and of others' (MENAGERIE_ROOT).
 
-    pareto: laws, triangles and time steps, and the tolerance of the implicit force: what each costs, and how far it is
-    from the finest.
+    pareto: what laws, triangles, time steps and tolerances cost, and how far they are from the finest.
 
-    kernel: the time of a buried triangle by the size of the body, over that of the tests' NumPy, and the share of what
-    the processor's arithmetic allows.
+    kernel: the time of a buried triangle, over NumPy's, and over what the processor allows.
 
-    solver: the evaluations that the implicit force takes, step by step, and the work that its sand does, in the hard
-    cases, the environments and articulated scenes drawn at random, at time steps from 1 to 10 ms.
+    solver: evaluations that the implicit force takes, and the work that its sand does, step by step.
 
-    terrain: the time that terrain and ruts take over a plane: of the force, of a step, and of 64 simulations at once.
+    terrain: the time that terrain and ruts take over a plane.
 
     Example: rftsim bench stability --plot out
     """
 
     study: tyro.conf.Positional[Literal["stability", "kernel", "environment", "pareto", "solver", "terrain"]]
-    """The study to run: what is measured, see above."""
-    cases: tuple[str, ...] = ()
-    """Names of the hard cases that stability and solver play, of the cases that environment times (wheel, go1), or of
-    the parts of pareto (laws, tolerance); by default all."""
-    starts: int = 1000
-    """Random starts of a free body on legs, of stability."""
-    scenes: int = 300
-    """Articulated scenes of solver, drawn from the seeds 0, 1, ..."""
-    quick: bool = False
-    """Fewer time steps, cases, tolerances, random starts and scenes; bodies of up to 20,480 triangles; fewer
-    repetitions; one law each."""
-    oracle: Path = Path("tests/oracle.py")
-    """The tests' laws in NumPy, that kernel compares with where they are there."""
-    plot: Path | None = None
-    """Folder for the study's picture, NAME.png, and tolerance.png of pareto's second part; solver has none."""
-    memory: Path = Path("out/bench")
-    """Folder for what stability, pareto and solver measured: stopped, they go on from there."""
-    json: bool = False
+    """What is measured, see above."""
+    cases: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ..", help_behavior_hint="")] = ()
+    """Hard cases, cases of environment (wheel, go1), or parts of pareto (laws, tolerance); by default all."""
+    starts: Count = 1000
+    """Random starts, of stability."""
+    scenes: Count = 300
+    """Articulated scenes, of solver."""
+    quick: Flag = False
+    """Fewer of everything: a look, not a measurement."""
+    oracle: Annotated[Path, tyro.conf.arg(metavar="FILE")] = Path("tests/oracle.py")
+    """Laws in NumPy, for kernel."""
+    plot: Folder = None
+    """Folder for the study's picture; solver has none."""
+    memory: Kept = Path("out/bench")
+    """What was measured: stopped, it goes on from there."""
+    json: Flag = False
     """Print JSON instead of the tables."""
 
     def __call__(self, warnings: Callable[[], list[str]]) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
+from rftsim.cli.options import Count, Flag, Kept
 from rftsim.cli.output import print_json, print_line, progress
 from rftsim.cli.results import draw, picture_in
 from rftsim.errors import RftsimError
@@ -24,11 +25,11 @@ class Demo:
     Example: rftsim demo --out out/demo
     """
 
-    out: Path = Path("out/demo")
+    out: Kept = Path("out/demo")
     """Folder for demo.png and grouser-wheel.rrd."""
-    processes: int = os.cpu_count() or 1
+    processes: Count = os.cpu_count() or 1
     """Runs that are simulated at a time."""
-    json: bool = False
+    json: Flag = False
     """Print JSON instead of the table."""
 
     def __call__(self, warnings: Callable[[], list[str]]) -> None:

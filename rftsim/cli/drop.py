@@ -4,14 +4,13 @@ import dataclasses
 import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
 
 import mujoco
 import numpy as np
-import tyro
 from rich.console import Console
 from rich.progress import Progress
 
+from rftsim.cli.options import Amount, Flag, Number, Output
 from rftsim.cli.output import is_quiet, print_doubts, print_json, print_line, print_written
 from rftsim.cli.scene import Scene, print_robot, robot_report
 from rftsim.errors import RftsimError
@@ -30,13 +29,13 @@ class Drop(Scene):
     Example: rftsim drop robot.xml --sand poppy-seeds -o settled.xml
     """
 
-    output: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
-    """Write the state: a keyframe for <include>, .xml, or arrays, .npz; by default the keyframe is printed."""
-    limit: float = 10.0
-    """Simulated time after which it is given up [s]."""
-    timestep: float | None = None
+    output: Output = None
+    """Keyframe for <include>, .xml, or arrays, .npz."""
+    limit: Amount = 10.0
+    """Simulated time at most [s]."""
+    timestep: Number = None
     """Time step [s]; by default the model's."""
-    json: bool = False
+    json: Flag = False
     """Print JSON."""
 
     def __call__(self, warnings: Callable[[], list[str]]) -> None:

@@ -2,7 +2,9 @@
 
 import contextlib
 import io
+import os
 import re
+import select
 import signal
 import sys
 import threading
@@ -13,8 +15,8 @@ import mujoco
 
 from rftsim.errors import RftsimError
 
-REFUSED, STOPPED, TERMINATED = 2, 130, 143
-"""Exit codes of inputs that cannot be, of Ctrl-C and of SIGTERM."""
+REFUSED, STOPPED, UNREAD, TERMINATED = 2, 130, 141, 143
+"""Exit codes of inputs that cannot be, of Ctrl-C, of a reader that has gone, and of SIGTERM."""
 ERRORS: Final = (
     RftsimError,
     ValueError,
@@ -74,3 +76,25 @@ def terminable() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGTERM, before)
+
+
+@contextlib.contextmanager
+def piped() -> Iterator[None]:
+    """Let the block end quietly where nobody reads standard output any more, as in `| head`."""
+    try:
+        try:
+            yield
+        finally:
+            sys.stdout.flush()
+    except BrokenPipeError:
+        if not _is_unread():
+            raise
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # where the interpreter flushes it at its end
+        sys.exit(UNREAD)
+
+
+def _is_unread() -> bool:
+    """Whether standard output is a pipe whose reader has gone."""
+    poll = select.poll()
+    poll.register(sys.stdout.fileno(), 0)
+    return any(event & select.POLLERR for _, event in poll.poll(0))

@@ -5,13 +5,14 @@ import itertools
 import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 from rich.console import Console
 from rich.progress import Progress
 
 from rftsim.cli.extra import needing
+from rftsim.cli.options import Count, File, Flag, Names, Text
 from rftsim.cli.output import is_quiet, make_table, print_json, print_written
 from rftsim.cli.results import draw
 from rftsim.errors import RftsimError
@@ -36,25 +37,25 @@ class Evaluate:
     Example: rftsim evaluate out/runner --baseline --plot runner.png
     """
 
-    runs: tyro.conf.Positional[tuple[Path, ...]]
+    runs: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER ..", help_behavior_hint="")]
     """Folders of `rftsim train`."""
-    on: str | None = None
-    """Names of grounds with commas between them; by default all for one folder, and sand,rigid for several."""
-    episodes: int = 20
+    on: Names = None
+    """Grounds; by default all for one folder, and sand,rigid for several."""
+    episodes: Count = 20
     """Number of episodes on each ground."""
-    seed: int = 10_000
+    seed: Count = 10_000
     """Episode k is seeded with seed + k."""
-    baseline: bool = False
-    """Score random actions, too, and the best of the task's drives that see nothing."""
-    plot: Path | None = None
+    baseline: Flag = False
+    """Score random actions, too, and the best open loop."""
+    plot: File = None
     """Draw the returns, .png, .pdf or .svg."""
-    markdown: bool = False
+    markdown: Flag = False
     """Print the table in Markdown, with the command."""
-    threads: int = 0
-    """Threads of the simulations; 0 for as many as there are processors."""
-    ray: str | None = None
-    """Score on Ray, a task for each run and ground: `local`, or the address of a cluster."""
-    json: bool = False
+    threads: Count = 0
+    """Threads; 0 for one a processor."""
+    ray: Text = None
+    """Score on Ray: local, or a cluster's address."""
+    json: Flag = False
     """Print JSON."""
 
     def __call__(self, warnings: Callable[[], list[str]]) -> None:

@@ -4,13 +4,15 @@ import dataclasses
 import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Final, Literal
 
 import numpy as np
 import tyro
 from rich.console import Console
 from rich.table import Table
 
+from rftsim.cli.commands import Group
+from rftsim.cli.options import Flag, Folder, Number, Output
 from rftsim.cli.output import print_doubts, print_json, print_line, print_written
 from rftsim.cli.results import draw, picture_in
 from rftsim.errors import RftsimError
@@ -28,32 +30,32 @@ from rftsim.sand.strength import xi_n_from_table
 
 @dataclasses.dataclass(frozen=True)
 class Map:
-    """f1, f2, f3 of 3D-RFT and xi_n, from square plates over beta, gamma and psi.
+    """A whole law, f1, f2, f3 of 3D-RFT and xi_n, from square plates over beta, gamma and psi.
 
-    Example: rftsim fit map plates.csv --mu-surf 0.4 -o my_sand.toml; then, with every command that takes them,
-    --law rft3d:my_sand.toml --sand my_sand.toml
+    Columns: beta, gamma, psi [deg], alpha_x, alpha_y, alpha_z [N/m^3], which is force over area and depth.
+
+    Example: rftsim fit map plates.csv --mu-surf 0.4 -o my_sand.toml; then --law rft3d:my_sand.toml --sand my_sand.toml
     """
 
-    data: tyro.conf.Positional[tuple[Path, ...]]
-    """Campaigns of rftsim-mpm (folders), or CSV files with columns beta, gamma, psi [deg], alpha_x, alpha_y, alpha_z
-    [N/m^3]: force over area and depth."""
-    output: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
+    data: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="DATA ..", help_behavior_hint="")]
+    """Folders of rftsim-mpm's campaigns, or CSV files."""
+    output: Output = None
     """Where the law and its sand are written, .toml."""
-    degree: Literal[3, 4] = 3
-    """Degree of the polynomials, of 20 terms each or of 35."""
-    dissipative: bool = False
-    """Never add energy: alpha_gen . v <= 0 at every orientation and motion."""
-    prior: float | None = None
-    """As how many plates the source's table (C.3, C.4) counts; by default whichever predicts held-back plates best."""
-    rho_c: float | None = None
-    """Density [kg/m^3]: which of a campaign's sands, or that of a CSV."""
-    mu_int: float | None = None
+    degree: Annotated[Literal[3, 4], tyro.conf.arg(metavar="3|4")] = 3
+    """Degree of the polynomials."""
+    dissipative: Flag = False
+    """Never add energy, at any orientation and motion."""
+    prior: Number = None
+    """Plates that the source's table counts for; by default whichever predicts held-back plates best."""
+    rho_c: Number = None
+    """Density [kg/m^3]: of a campaign's sands, or a CSV's."""
+    mu_int: Number = None
     """Internal friction [-], likewise."""
-    mu_surf: float | None = None
-    """Friction between plate and sand [-], likewise; a CSV needs it."""
-    plot: Path | None = None
+    mu_surf: Number = None
+    """Friction of plate and sand [-]; a CSV needs it."""
+    plot: Folder = None
     """Folder for fit-map.png."""
-    json: bool = False
+    json: Flag = False
     """Print JSON."""
 
     def __call__(self, warnings: Callable[[], list[str]]) -> None:
@@ -179,13 +181,13 @@ class _Trial:
 
     data: tyro.conf.Positional[Path]
     """CSV file with one row for each reading; columns are named below."""
-    known: str = ""
-    """Parameters of the sand that are known: key=value,... or a TOML file; they go into the line that is printed."""
-    output: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
+    known: Annotated[str, tyro.conf.arg(metavar="TEXT", help_behavior_hint="")] = ""
+    """What is known of the sand: key=value,.. or a TOML file."""
+    output: Output = None
     """Where the sand is written, .toml, for --sand."""
-    plot: Path | None = None
+    plot: Folder = None
     """Folder for the picture."""
-    json: bool = False
+    json: Flag = False
     """Print JSON."""
 
     def estimate(self) -> trials.Found:
@@ -235,8 +237,8 @@ class Plate(_Trial):
     Example: rftsim fit plate plate.csv --area 0.0028 --known rho_c=1330,mu_int=0.55
     """
 
-    area: float | None = None
-    """Area of the plate [m^2], where the data have no such column."""
+    area: Number = None
+    """Area of the plate [m^2], if the data have none."""
 
     def estimate(self) -> trials.Found:
         """Estimate the sand's parameters from the data of the trial."""
@@ -253,10 +255,10 @@ class Drag(_Trial):
     Example: rftsim fit drag drag.csv --area 0.016 --rho-c 900
     """
 
-    rho_c: float
+    rho_c: Annotated[float, tyro.conf.arg(metavar="X")]
     """Density of the sand [kg/m^3]."""
-    area: float | None = None
-    """Area of the plate [m^2], where the data have no such column."""
+    area: Number = None
+    """Area of the plate [m^2], if the data have none."""
 
     def estimate(self) -> trials.Found:
         """Estimate the sand's parameters from the data of the trial."""
@@ -294,20 +296,7 @@ def _known(text: str) -> dict[str, float]:
     return found
 
 
-@dataclasses.dataclass(frozen=True)
-class Fit:
-    """From data to law: a table of 3D-RFT from plates, or a sand's parameters from trials.
-
-    Example: rftsim fit map plates.csv --mu-surf 0.4 -o my_sand.toml
-    """
-
-    what: (
-        Annotated[Map, tyro.conf.subcommand("map", prefix_name=False)]
-        | Annotated[Plate, tyro.conf.subcommand("plate", prefix_name=False)]
-        | Annotated[Drag, tyro.conf.subcommand("drag", prefix_name=False)]
-        | Annotated[Friction, tyro.conf.subcommand("friction", prefix_name=False)]
-    )
-
-    def __call__(self, warnings: Callable[[], list[str]]) -> None:
-        """Fit the law or the trial that was asked for."""
-        self.what(warnings)
+FIT: Final = Group(
+    "From data to a law, or to a sand's parameters.\n\nExample: rftsim fit plate plate.csv --area 0.0028 -o sand.toml",
+    {"map": Map, "plate": Plate, "drag": Drag, "friction": Friction},
+)

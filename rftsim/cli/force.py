@@ -4,18 +4,20 @@ import dataclasses
 import math
 from collections.abc import Callable
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 import tyro
 from rich.console import Console
 
+from rftsim.cli.options import Amount, Flag
 from rftsim.cli.output import print_json, print_line
 from rftsim.errors import RftsimError
 from rftsim.law.rigid import surface_force
 from rftsim.sand.presets import make_sand
 from rftsim.surface.triangles import load_surface
 
-Vector = tuple[float, float, float]
+Vector = Annotated[tuple[float, float, float], tyro.conf.arg(metavar="X Y Z")]
 """Three numbers on the command line: x, y, z."""
 
 
@@ -35,17 +37,17 @@ class Force:
     """Where the mesh's own origin is [m]; the moment is about it."""
     angular_velocity: Vector = (0.0, 0.0, 0.0)
     """Angular velocity, world frame [rad/s]."""
-    law: str = "rft3d"
-    """rft2d, drft2d, rft3d, drft3d; rft3d:c4 takes the quartic table, rft3d:FILE.toml that of `rftsim fit map`."""
-    sand: str = "poppy-seeds"
-    """A preset, key=value,... or a TOML file."""
+    law: Annotated[str, tyro.conf.arg(metavar="NAME")] = "rft3d"
+    """rft2d, drft2d, rft3d, drft3d, rft3d:c4, rft3d:FILE.toml."""
+    sand: Annotated[str, tyro.conf.arg(metavar="TEXT")] = "poppy-seeds"
+    """A preset, key=value,.. or a TOML file."""
     plane: Vector = (0.0, 1.0, 0.0)
     """Normal of the plane of motion of the 2D laws."""
-    scale: float = 1.0
+    scale: Amount = 1.0
     """Factor on the mesh's lengths: 0.001 for millimetres."""
-    allow_open: bool = False
+    allow_open: Flag = False
     """Accept a mesh that is not closed."""
-    json: bool = False
+    json: Flag = False
     """Print JSON."""
 
     def __call__(self, warnings: Callable[[], list[str]]) -> None:

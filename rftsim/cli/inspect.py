@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from rftsim.cli.options import Flag, Number
 from rftsim.cli.output import print_json, print_line
 from rftsim.cli.scene import Scene, surface_report
 from rftsim.errors import RftsimError
@@ -28,11 +29,11 @@ class Inspect(Scene):
     Example: rftsim inspect robot.xml --sand poppy-seeds --reduction 0.01
     """
 
-    reduction: float | None = None
-    """Largest error of a body's wrench, from which follows how many elements it needs; by default 0.01."""
-    speed: float | None = None
+    reduction: Number = None
+    """Error of a body's wrench, at most; by default 0.01."""
+    speed: Number = None
     """Speed that decides on the law [m/s]; by default that of the fastest body at the start."""
-    json: bool = False
+    json: Flag = False
     """Print JSON."""
 
     def __call__(self, warnings: Callable[[], list[str]]) -> None:

@@ -1,19 +1,21 @@
 """`rftsim`: every command, and how its errors end."""
 
+import importlib.metadata
 import sys
 import warnings
-from typing import Annotated, Any
+from typing import Final
 
-import tyro
+import mujoco
 from rich.console import Console
 from rich.markup import escape
 
 from rftsim.cli.bench import Bench
+from rftsim.cli.commands import Group, read
 from rftsim.cli.demo import Demo
 from rftsim.cli.drop import Drop
-from rftsim.cli.ends import ERRORS, REFUSED, STOPPED, parsed, said, terminable, unlogged
+from rftsim.cli.ends import ERRORS, REFUSED, STOPPED, parsed, piped, said, terminable, unlogged
 from rftsim.cli.evaluate import Evaluate
-from rftsim.cli.fit import Fit
+from rftsim.cli.fit import FIT
 from rftsim.cli.force import Force
 from rftsim.cli.inspect import Inspect
 from rftsim.cli.output import print_doubts, print_line
@@ -24,31 +26,42 @@ from rftsim.cli.validate import Validate
 from rftsim.cli.view import View
 from rftsim.errors import RftsimNote, RftsimWarning
 
-Command = (
-    Annotated[Force, tyro.conf.subcommand("force")]
-    | Annotated[Run, tyro.conf.subcommand("run")]
-    | Annotated[Drop, tyro.conf.subcommand("drop")]
-    | Annotated[View, tyro.conf.subcommand("view")]
-    | Annotated[Inspect, tyro.conf.subcommand("inspect")]
-    | Annotated[Fit, tyro.conf.subcommand("fit")]
-    | Annotated[Demo, tyro.conf.subcommand("demo")]
-    | Annotated[Bench, tyro.conf.subcommand("bench")]
-    | Annotated[Validate, tyro.conf.subcommand("validate")]
-    | Annotated[Train, tyro.conf.subcommand("train")]
-    | Annotated[Play, tyro.conf.subcommand("play")]
-    | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
+COMMANDS: Final = Group(
+    "Sand for MuJoCo: granular resistive forces on the bodies of any model. `rftsim run --help` says more of one.\n\n"
+    "Example: rftsim run robot.xml --sand poppy-seeds --picture run.png",
+    {
+        "run": Run,
+        "view": View,
+        "drop": Drop,
+        "inspect": Inspect,
+        "force": Force,
+        "fit": FIT,
+        "train": Train,
+        "play": Play,
+        "evaluate": Evaluate,
+        "demo": Demo,
+        "bench": Bench,
+        "validate": Validate,
+    },
 )
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run the command that the arguments name; exit with 2 where its input cannot be, and with 130 after Ctrl-C."""
-    console = Console(stderr=True)
+    """Run the command that the arguments name.
+
+    It exits with 2 where its input cannot be, with 130 after Ctrl-C, and with 141 where nobody reads what it prints.
+    """
+    console, given = Console(stderr=True), sys.argv[1:] if arguments is None else arguments
     with terminable(), unlogged(), warnings.catch_warnings(record=True) as caught:
         for kind in (RftsimNote, RftsimWarning):
             warnings.simplefilter("always", kind)
         try:
-            command = parsed(lambda: _parse(arguments))
-            command(lambda: texts_of(caught, RftsimWarning))
+            with piped():
+                if given == ["--version"]:
+                    print(f"rftsim {importlib.metadata.version('rftsim')}, MuJoCo {mujoco.__version__}")
+                    return
+                command = parsed(lambda: read("rftsim", COMMANDS, given))
+                command(lambda: texts_of(caught, RftsimWarning))
         except KeyboardInterrupt:
             print_line(console, "stopped")
             sys.exit(STOPPED)
@@ -59,16 +72,6 @@ def main(arguments: list[str] | None = None) -> None:
             _print_notes(console, caught)
             raise
         _print_notes(console, caught)
-
-
-def _parse(arguments: list[str] | None) -> Any:
-    return tyro.cli(
-        Command,
-        prog="rftsim",
-        description="Sand for MuJoCo: granular resistive forces on the bodies of any model.",
-        args=arguments,
-        config=(tyro.conf.OmitArgPrefixes,),
-    )
 
 
 def _print_notes(console: Console, caught: list[warnings.WarningMessage]) -> None:

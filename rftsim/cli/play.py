@@ -3,14 +3,14 @@
 import contextlib
 import dataclasses
 from collections.abc import Callable, Mapping
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 from rich.console import Console
 from rich.table import Table
 
 from rftsim.cli.extra import needing
+from rftsim.cli.options import Count, File, Flag, Number
 from rftsim.cli.output import make_table, print_json, print_written
 from rftsim.cli.settings import Settings, read_settings
 from rftsim.errors import RftsimError
@@ -38,23 +38,25 @@ class Play:
 
     run: tyro.conf.Positional[str]
     """A folder of `rftsim train`, or an environment: rftsim/NAME-v0, NAME, or FILE.py:CLASS."""
-    actions: Literal["policy", "zero", "random"] | None = None
-    """Who acts: by default the policy of a folder, and random actions in an environment."""
-    episodes: int = 1
+    actions: Annotated[
+        Literal["policy", "zero", "random"] | None, tyro.conf.arg(metavar="WHOSE", help_behavior_hint="")
+    ] = None
+    """policy, zero or random; by default a folder's policy."""
+    episodes: Count = 1
     """Number of episodes."""
-    seconds: float | None = None
+    seconds: Number = None
     """Longest time of an episode [s], at which it is cut."""
-    seed: int = 0
+    seed: Count = 0
     """Episode k is seeded with seed + k."""
     set: Settings = ()
-    """Settings of the task, key=value ...: ground=rigid; may be repeated."""
-    record: Path | None = None
+    """Of the task: ground=rigid."""
+    record: File = None
     """Write a Rerun recording, .rrd."""
-    video: Path | None = None
+    video: File = None
     """Write a film, .mp4."""
-    picture: Path | None = None
-    """Write a picture of four moments, with arrows for the sand's traction, .png."""
-    json: bool = False
+    picture: File = None
+    """Picture of four moments, with tractions, .png."""
+    json: Flag = False
     """Print JSON."""
 
     def __call__(self, warnings: Callable[[], list[str]]) -> None:

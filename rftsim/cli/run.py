@@ -4,14 +4,15 @@ import contextlib
 import dataclasses
 import math
 from collections.abc import Callable
-from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import mujoco
+import tyro
 from rich.console import Console
 from rich.progress import Progress
 
 from rftsim.cli.extra import needing
+from rftsim.cli.options import File, Flag, Number
 from rftsim.cli.output import is_quiet, print_doubts, print_json, print_written
 from rftsim.cli.results import draw
 from rftsim.cli.scene import Scene, print_robot, robot_report
@@ -28,36 +29,36 @@ from rftsim.view.render import Pictures, save_picture
 
 @dataclasses.dataclass(frozen=True)
 class Run(Scene):
-    """Run a scene on sand and report its steady state: means over the last 40 %.
+    """Run a scene on sand, and say how it moves and stands; film it, picture it, record it.
 
-    Of a model file also, at the end: the trunk's height, each foot's sinkage, and what the sand carries of the weight.
+    Speed, sinkage and slip are means over the last 40 %.
 
     Example: rftsim run grouser-wheel --set rpm=60 --plot wheel.png --record wheel.rrd
     """
 
-    force: Literal["implicit", "explicit"] = "implicit"
-    """The sand's force: at the end of each step, or at the velocity of the moment, which needs short steps."""
-    duration: float | None = None
+    force: Annotated[Literal["implicit", "explicit"], tyro.conf.arg(metavar="HOW", help_behavior_hint="")] = "implicit"
+    """implicit, or explicit, which needs short steps."""
+    duration: Number = None
     """Simulated time [s]; by default the scene's."""
-    timestep: float | None = None
+    timestep: Number = None
     """Time step [s]; by default the scene's."""
-    record: Path | None = None
+    record: File = None
     """Write a Rerun recording, .rrd."""
-    plot: Path | None = None
+    plot: File = None
     """Draw the run, .png, .pdf or .svg."""
-    picture: Path | None = None
-    """Render the last moment, with the sand's forces as arrows, .png."""
-    video: Path | None = None
-    """Film the run, with the sand's forces as arrows, .mp4."""
-    arrows: bool = True
-    """Show the sand's force on each body in pictures and films."""
-    tractions: bool = False
-    """Show the sand's tractions in pictures and films, one arrow for each patch of a body, and their scale."""
-    buried: bool = False
-    """Let what is buried show through the sand in pictures and films."""
-    settle: bool = True
-    """Start a model file where it stands: what floats is lowered or raised until the sand carries it."""
-    json: bool = False
+    picture: File = None
+    """Picture of the last moment, .png."""
+    video: File = None
+    """Film of the run, .mp4."""
+    arrows: Flag = True
+    """Arrows for forces; this leaves them out."""
+    tractions: Flag = False
+    """Arrows for tractions, and their scale."""
+    buried: Flag = False
+    """What is buried shows through the sand."""
+    settle: Flag = True
+    """Start where the sand carries it; this does not."""
+    json: Flag = False
     """Print JSON."""
 
     def __call__(self, warnings: Callable[[], list[str]]) -> None:

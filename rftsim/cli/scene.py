@@ -3,12 +3,13 @@
 import dataclasses
 import math
 from collections.abc import Iterator
-from typing import Any
+from typing import Annotated, Any
 
 import tyro
 from rich.console import Console
 from rich.markup import escape
 
+from rftsim.cli.options import Flag, Name, Names, Number, Text, Whole
 from rftsim.cli.output import print_line
 from rftsim.cli.settings import Settings, read_settings
 from rftsim.errors import RftsimError
@@ -24,36 +25,33 @@ class Scene:
     """A scene on sand, as the command line has it."""
 
     scene: tyro.conf.Positional[str]
-    """A shipped scene (grouser-wheel, half-grouser-wheel, four-flap-runner, intruder) or a model file, MJCF or URDF."""
-    law: str | None = None
-    """Law to take instead of the scene's."""
-    sand: str | None = None
-    """Sand to take instead of the scene's: a preset, key=value,... or a TOML file."""
+    """Model file, MJCF or URDF, or grouser-wheel, half-grouser-wheel, four-flap-runner, intruder."""
+    law: Name = None
+    """rft2d, drft2d, rft3d, drft3d; by default the scene's."""
+    sand: Text = None
+    """A preset, key=value,.. or a TOML file."""
     set: Settings = ()
-    """Settings of a shipped scene, key=value ...; may be repeated."""
-    bodies: str | None = None
-    """Names of the bodies that feel the sand, a,b,...; by default each that can move and has geoms."""
-    geoms: Geoms = "collision"
-    """Geoms that bound a body: those that can collide, or, where a body has none of these, all that it has."""
-    meshes: Meshes | None = None
-    """How meshes of model files are felt: hull, as MuJoCo collides with them, or exact, as they are where closed."""
-    terrain: str | None = None
-    """The sand's surface: a height [m]; slope=DEGREES[,heading=DEGREES]; dunes[,amplitude=M,wavelength=M,seed=N];
-    FILE.png,size=XxY,high=M[,low=M]; a .npy, .npz or .csv of heights with spacing=M; or the name of a height field geom
-    of the model. By default that of the floor, whose place it takes."""
-    ruts: bool = False
-    """Let the sand remember: bodies leave ruts, prints and heaps in it, which they feel when they come back."""
-    keyframe: str | None = None
-    """Name or number of the keyframe in which a model file starts; by default the first."""
-    keep_floor: bool = False
-    """Leave the floor at the sand's level as it is; by default it no longer collides, and is hidden."""
-    reduction: float | None = None
-    """Model only what the scene needs: the fewest elements whose wrench errs by at most this share; 0 for every
-    triangle; by default 0.01 for model files, and 0 for shipped scenes."""
-    tolerance: float | None = None
-    """Error of a body's velocity, relative, that the implicit force is solved to, 1e-6 to 0.1; by default 0.003."""
-    iterations: int | None = None
-    """Most iterations of one solution of the implicit force, 1 to 60; by default 20."""
+    """Settings of a shipped scene."""
+    bodies: Names = None
+    """Bodies that feel sand; by default all that can."""
+    geoms: Annotated[Geoms, tyro.conf.arg(metavar="WHICH", help_behavior_hint="")] = "collision"
+    """Of bodies that cannot collide: collision, or all."""
+    meshes: Annotated[Meshes | None, tyro.conf.arg(metavar="HOW", help_behavior_hint="")] = None
+    """How meshes are felt: hull, or exact."""
+    terrain: Text = None
+    """Surface: 0.2, slope=10, dunes,seed=1, hill.png,size=8x6,high=1, a height field's name; by default the floor's."""
+    ruts: Flag = False
+    """The sand keeps ruts, prints and heaps."""
+    keyframe: Name = None
+    """Keyframe to start in; by default the first."""
+    keep_floor: Flag = False
+    """Leave the floor at the sand's level as it is."""
+    reduction: Number = None
+    """Elements for this error; by default 0.01, of shipped scenes 0: every triangle."""
+    tolerance: Number = None
+    """Of the implicit force, 1e-6 to 0.1; by default 0.003."""
+    iterations: Whole = None
+    """Of it, at most, 1 to 60; by default 40."""
 
     def staged(self, *, settle: bool = True, **options: Any) -> Staged:
         """Make the scene with its sand, compiled.

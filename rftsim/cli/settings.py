@@ -4,7 +4,11 @@ from typing import Annotated
 
 import tyro
 
-Settings = Annotated[tuple[tuple[str, ...], ...], tyro.conf.UseAppendAction]
+Settings = Annotated[
+    tuple[tuple[str, ...], ...],
+    tyro.conf.UseAppendAction,
+    tyro.conf.arg(metavar="KEY=VALUE ..", help_behavior_hint=""),
+]
 """Words of an option that takes several and may be repeated."""
 
 

@@ -7,13 +7,14 @@ import signal
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from rftsim.cli.extra import needing
+from rftsim.cli.options import Count, Flag, Names, Number, Text, Whole
 from rftsim.cli.output import is_quiet, print_json, print_line
 from rftsim.cli.settings import Settings, read_settings
 from rftsim.errors import RftsimError
@@ -37,37 +38,34 @@ class Train:
     """
 
     env: tyro.conf.Positional[str]
-    """rftsim/NAME-v0 or NAME; or a task of one's own, FILE.py:CLASS or MODULE:CLASS. Locomotion takes a robot of one's
-    own: --set model=PATH."""
-    out: Path
+    """rftsim/NAME-v0, NAME, or FILE.py:CLASS; Locomotion takes a robot of one's own: --set model=PATH."""
+    out: Annotated[Path, tyro.conf.arg(metavar="FOLDER")]
     """Folder of the run."""
-    algo: Literal["ppo"] = "ppo"
+    algo: Annotated[Literal["ppo"], tyro.conf.arg(metavar="NAME")] = "ppo"
     """Algorithm that the policy is trained by."""
-    steps: int | None = None
-    """Control steps in all; by default the task's. Rounded up to whole steps of all simulations."""
-    seed: int = 0
+    steps: Whole = None
+    """Control steps in all; by default the task's."""
+    seed: Count = 0
     """Seed of everything that is drawn at random."""
-    envs: int | None = None
+    envs: Whole = None
     """Simulations side by side; by default the task's."""
     set: Settings = ()
-    """Settings of the task, key=value ...: ground=rigid strength=0.5,2; may be repeated."""
+    """Of the task: ground=rigid strength=0.5,2."""
     hyper: Settings = ()
-    """Settings of PPO, key=value ...: learning_rate=1e-3 layers=128,128; may be repeated."""
-    threads: int = 0
-    """Threads of the simulations; 0 for as many as there are processors."""
-    tensorboard: bool = False
+    """Of PPO: learning_rate=1e-3 layers=128,128."""
+    threads: Count = 0
+    """Threads; 0 for one a processor."""
+    tensorboard: Flag = False
     """Write for TensorBoard, too, under OUT/tensorboard."""
-    watch: float | None = None
-    """Record an episode of the policy each time that so many seconds have passed, and at the end, for Rerun, to
-    OUT/watch/STEPS.rrd."""
-    seeds: str | None = None
-    """Several runs, 0,1,2: each in OUT/seed-N, one after the other or on Ray."""
+    watch: Number = None
+    """Record an episode for Rerun each so many seconds, and at the end, to OUT/watch."""
+    seeds: Names = None
+    """Several runs, 0,1,2: each in OUT/seed-N."""
     vary: Settings = ()
-    """Several runs, in OUT/key=value/seed-N: settings with each value that they take, ground=sand ground=rigid."""
-    ray: str | None = None
-    """Train the runs as tasks on Ray: `local`, or the address of a cluster that shares OUT. A run whose worker dies
-    goes on from its checkpoint; finished ones are not repeated."""
-    json: bool = False
+    """Several runs, in OUT/key=value/seed-N: settings with each value, ground=sand ground=rigid."""
+    ray: Text = None
+    """Train the runs on Ray: local, or a cluster's address."""
+    json: Flag = False
     """Print JSON instead of progress."""
 
     def __call__(self, warnings: Callable[[], list[str]]) -> None:

@@ -5,13 +5,14 @@ import math
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from rftsim.cli.options import Flag, Folder, Kept
 from rftsim.cli.output import print_json, print_line, progress
 from rftsim.cli.results import draw, picture_in, remembered_in
 from rftsim.errors import RftsimError
@@ -36,20 +37,21 @@ class Validate:
     Example: rftsim validate --quick --plot out
     """
 
-    studies: tyro.conf.Positional[tuple[str, ...]] = ()
+    studies: Annotated[
+        tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="STUDY ..", help_behavior_hint="")
+    ] = ()
     """Names of studies; by default all."""
-    quick: bool = False
+    quick: Flag = False
     """Fewer rates; some minutes for all studies."""
-    data: Path | None = None
-    """Folder of measured data: cmu_wheel_grouser.csv, cmu_circular_plate_sinkage.csv; by default ../shared/data/cmu,
-    where there is one."""
-    plot: Path | None = None
+    data: Folder = None
+    """Measured data: cmu_wheel_grouser.csv, cmu_circular_plate_sinkage.csv; by default ../shared/data/cmu."""
+    plot: Folder = None
     """Folder for the figures, STUDY.png."""
-    memory: Path = Path("out/validate")
+    memory: Kept = Path("out/validate")
     """Folder for what was measured."""
-    markdown: bool = False
+    markdown: Flag = False
     """Print one table in Markdown, with the command."""
-    json: bool = False
+    json: Flag = False
     """Print JSON."""
 
     def __call__(self, warnings: Callable[[], list[str]]) -> None:

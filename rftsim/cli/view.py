@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 from rich.console import Console
 
+from rftsim.cli.options import Flag, Number
 from rftsim.cli.output import print_line
 from rftsim.cli.scene import Scene
 from rftsim.errors import RftsimError
@@ -21,12 +22,12 @@ class View(Scene):
     Example: rftsim view robot.xml --sand poppy-seeds
     """
 
-    settle: bool = True
-    """Start a model file where it stands: what floats is lowered or raised until the sand carries it."""
-    timestep: float | None = None
+    settle: Flag = True
+    """Start where the sand carries it; this does not."""
+    timestep: Number = None
     """Time step [s]; by default the scene's."""
-    seconds: float | None = None
-    """Time after which the window closes by itself [s]."""
+    seconds: Number = None
+    """Time after which the window closes [s]."""
 
     def __call__(self, warnings: Callable[[], list[str]]) -> None:
         """Open the window, and go on until it is closed."""

@@ -86,7 +86,7 @@ def rows(measured: Measured) -> list[Row]:
         near("DRFT: its sinkage/ℓ", half[-1]["sinkage"], sunk[f"{TWIN:g}"], 2e-4, twin),
         near("RFT: v/(Rω) by static balance, one third", third["rolling"], mean, 0.002, "our simulation, its mean"),
         Row("the same, full grousers", full["rolling"], "no shadow"),
-        Row("the same, least power", least["rolling"], "see README; nothing fitted"),
+        Row("the same, least power", least["rolling"], "by the upper bound theorem; nothing fitted"),
         Row("terramechanics: v/(Rω)", plain["rolling"], terramechanics.POPPY_SOURCE, note="smooth"),
         Row("terramechanics: sinkage/ℓ", plain["sinkage"], terramechanics.POPPY_SOURCE),
     ]

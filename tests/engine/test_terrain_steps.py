@@ -53,7 +53,7 @@ def starts_on_dunes(count):
 
 
 def test_the_sand_does_no_work_on_what_is_thrown_onto_dunes():
-    """What README says of level sand: at most 1e-7 of the kinetic energy, and what creep at 3e-7 m/s does."""
+    """As on level sand: at most 1e-7 of the kinetic energy, and what creep at 3e-7 m/s does."""
     lost, most = starts_on_dunes(100)
     assert lost == 0
     assert most < 1e-6

@@ -6,6 +6,7 @@ from rich.console import Console
 from rich.table import Table
 
 from rftsim_mpm.bench import throughput, together
+from rftsim_mpm.cli.options import Flag
 from rftsim_mpm.cli.report import print_json
 from rftsim_mpm.errors import MpmError
 
@@ -19,9 +20,9 @@ class Bench:
 
     processes: int = 2
     """Run this many at a time, against one; 1 leaves that out."""
-    quick: bool = False
+    quick: Flag = False
     """Fewer particles and repetitions; one process."""
-    json: bool = False
+    json: Flag = False
     """Print JSON instead of a table."""
 
     def __call__(self) -> None:

@@ -4,15 +4,16 @@ import dataclasses
 import os
 import sys
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any, Final
 
 import tyro
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from rftsim_mpm.campaign import Status, alone, begin, manifest, read_jobs, results, run, run_on_ray, status
+from rftsim_mpm.cli.commands import Group
+from rftsim_mpm.cli.options import File, Flag, Text
 from rftsim_mpm.cli.report import print_json
-from rftsim_mpm.cli.study import Group
 from rftsim_mpm.errors import MpmError
 from rftsim_mpm.output import check_writable, replacing
 
@@ -25,9 +26,9 @@ class Work:
 
     processes: int = os.cpu_count() or 1
     """Jobs at a time, one thread each."""
-    ray: str | None = None
+    ray: Text = None
     """Use Ray instead: "local", or the address of a cluster."""
-    json: bool = False
+    json: Flag = False
     """Print JSON instead of lines for people."""
 
     def __post_init__(self) -> None:
@@ -72,7 +73,7 @@ class CampaignRun:
     folder: Folder
     """Where manifest.json and results/ go."""
     work: tyro.conf.OmitArgPrefixes[Work] = dataclasses.field(default_factory=Work)
-    quick: bool = False
+    quick: Flag = False
     """Coarser cells and less sand: a look, not a measurement."""
 
     def __call__(self) -> None:
@@ -86,9 +87,13 @@ class CampaignRun:
 
 @dataclasses.dataclass(frozen=True)
 class CampaignResume:
-    """Compute what a campaign lacks: unfinished jobs, and results that are damaged."""
+    """Compute what a campaign lacks: unfinished jobs, and results that are damaged.
+
+    Example: rftsim-mpm campaign resume out/plates
+    """
 
     folder: Folder
+    """The campaign's folder."""
     work: tyro.conf.OmitArgPrefixes[Work] = dataclasses.field(default_factory=Work)
 
     def __call__(self) -> None:
@@ -99,12 +104,16 @@ class CampaignResume:
 
 @dataclasses.dataclass(frozen=True)
 class CampaignStatus:
-    """How far a campaign is; with --plot, the forces that it has."""
+    """Say how far a campaign is; with --plot, draw the forces that it has.
+
+    Example: rftsim-mpm campaign status out/plates --plot forces.png
+    """
 
     folder: Folder
-    plot: Path | None = None
+    """The campaign's folder."""
+    plot: File = None
     """Draw force per area and depth against the direction of motion, .png, .pdf or .svg."""
-    json: bool = False
+    json: Flag = False
     """Print JSON instead of lines for people."""
 
     def __call__(self) -> None:
@@ -125,10 +134,14 @@ class CampaignStatus:
 
 @dataclasses.dataclass(frozen=True)
 class CampaignVerify:
-    """Check every result against its checksum and its job; exits with 1 where one is damaged."""
+    """Check every result against its checksum and its job; exits with 1 where one is damaged.
+
+    Example: rftsim-mpm campaign verify out/plates
+    """
 
     folder: Folder
-    json: bool = False
+    """The campaign's folder."""
+    json: Flag = False
     """Print JSON instead of lines for people."""
 
     def __call__(self) -> None:
@@ -139,15 +152,11 @@ class CampaignVerify:
             sys.exit(1)
 
 
-class CampaignCommand(
-    Group[
-        Annotated[CampaignRun, tyro.conf.subcommand("run")]
-        | Annotated[CampaignResume, tyro.conf.subcommand("resume")]
-        | Annotated[CampaignStatus, tyro.conf.subcommand("status")]
-        | Annotated[CampaignVerify, tyro.conf.subcommand("verify")]
-    ]
-):
-    """A grid of plates, pushes, wheels or slopes as independent processes; stop it in any way, and resume."""
+CAMPAIGNS: Final = Group(
+    "A grid of plates, pushes, wheels or slopes as independent processes; stop it in any way, and resume.\n\n"
+    "Example: rftsim-mpm campaign run plates.toml out/plates",
+    {"run": CampaignRun, "resume": CampaignResume, "status": CampaignStatus, "verify": CampaignVerify},
+)
 
 
 def _say(folder: Path, found: Status, json: bool, more: dict[str, Any]) -> None:

@@ -2,9 +2,7 @@
 
 import dataclasses
 from pathlib import Path
-from typing import Annotated, Any
-
-import tyro
+from typing import Any, Final
 
 from rftsim_mpm.cases import (
     CylinderDrag,
@@ -20,12 +18,16 @@ from rftsim_mpm.cases import (
     plowing,
     shear_zone,
 )
-from rftsim_mpm.cli.study import Group, StudyCommand
+from rftsim_mpm.cli.commands import Group
+from rftsim_mpm.cli.study import StudyCommand
 from rftsim_mpm.simulation import Watch
 
 
 class CaseOne(StudyCommand[CylinderDrag, CylinderForces]):
-    """Case 1, a cylinder dragged: drag grows with depth, lift levels off (NDPM)."""
+    """Case 1, a cylinder dragged: drag grows with depth, lift levels off (NDPM).
+
+    Example: rftsim-mpm case 1 --plot case.png
+    """
 
     title = "case 1"
 
@@ -62,7 +64,10 @@ class CaseOne(StudyCommand[CylinderDrag, CylinderForces]):
 
 
 class CaseTwo(StudyCommand[Plates, PlatesForces]):
-    """Case 2, plates pushed down: peak ~ L^2, deeper force ~ z L, and a pair helps itself at a small gap (NDPM)."""
+    """Case 2, plates pushed down: peak ~ L^2, deeper force ~ z L, and a pair helps itself at a small gap (NDPM).
+
+    Example: rftsim-mpm case 2 --plot case.png
+    """
 
     title = "case 2"
 
@@ -101,7 +106,10 @@ class CaseTwo(StudyCommand[Plates, PlatesForces]):
 
 
 class CaseThree(StudyCommand[Plowing, PlowingForces]):
-    """Case 3, plowing: smooth drag in loose sand, fluctuating in dense sand (DPM)."""
+    """Case 3, plowing: smooth drag in loose sand, fluctuating in dense sand (DPM).
+
+    Example: rftsim-mpm case 3 --plot case.png
+    """
 
     title = "case 3"
 
@@ -135,7 +143,10 @@ class CaseThree(StudyCommand[Plowing, PlowingForces]):
 
 
 class CaseFour(StudyCommand[ShearZone, Wedge]):
-    """Case 4, the zone under a plate that moves with it: blunt at first, then a wedge (DPM)."""
+    """Case 4, the zone under a plate that moves with it: blunt at first, then a wedge (DPM).
+
+    Example: rftsim-mpm case 4 --plot case.png
+    """
 
     title = "case 4"
 
@@ -167,12 +178,7 @@ class CaseFour(StudyCommand[ShearZone, Wedge]):
         plot_lines(curve, ("t v / L", "force [N/m]"), some, path)
 
 
-class CaseCommand(
-    Group[
-        Annotated[CaseOne, tyro.conf.subcommand("1")]
-        | Annotated[CaseTwo, tyro.conf.subcommand("2")]
-        | Annotated[CaseThree, tyro.conf.subcommand("3")]
-        | Annotated[CaseFour, tyro.conf.subcommand("4")]
-    ]
-):
-    """The verification cases of [Agarwal] section 2.4."""
+CASES: Final = Group(
+    "The verification cases of [Agarwal] section 2.4.\n\nExample: rftsim-mpm case 1 --plot case.png",
+    {"1": CaseOne, "2": CaseTwo, "3": CaseThree, "4": CaseFour},
+)

@@ -4,6 +4,7 @@ import dataclasses
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from rftsim_mpm.cli.options import Flag
 from rftsim_mpm.cli.study import StudyCommand, with_last_frame
 from rftsim_mpm.fields import Frame
 from rftsim_mpm.plate import Array, Plate, PlateForce, extrapolated, finer, measure
@@ -29,8 +30,8 @@ class PlateCommand(StudyCommand[Plate, PlateFound]):
     """
 
     title = "plate"
-    extrapolate: bool = False
-    """Also run more cells (twice, in 3D one and a half times as many), and give the limit."""
+    extrapolate: Flag = False
+    """Run more cells, too, and give the limit."""
 
     def _quicker(self) -> Plate:
         return self.study.quick

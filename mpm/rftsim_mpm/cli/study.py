@@ -11,6 +11,7 @@ from typing import Any, ClassVar, Generic, TypeVar
 import tyro
 from rich.console import Console
 
+from rftsim_mpm.cli.options import File, Flag
 from rftsim_mpm.cli.report import print_json, progress
 from rftsim_mpm.errors import MpmError
 from rftsim_mpm.fields import Camera, Frame
@@ -19,20 +20,19 @@ from rftsim_mpm.simulation import Simulation, Watch
 
 Study = TypeVar("Study")
 Found = TypeVar("Found")
-Chosen = TypeVar("Chosen", bound=Callable[[], None])
 
 
 @dataclasses.dataclass(frozen=True)
 class Outputs:
     """Where a study's results go, and whether it is run quickly."""
 
-    quick: bool = False
+    quick: Flag = False
     """Coarser and shorter: a look, not a measurement."""
-    json: bool = False
+    json: Flag = False
     """Print JSON instead of lines for people."""
-    plot: Path | None = None
+    plot: File = None
     """Draw the result, .png, .pdf or .svg."""
-    record: Path | None = None
+    record: File = None
     """Write a Rerun recording of the first run, .rrd."""
 
     def check(self) -> None:
@@ -144,14 +144,3 @@ def with_last_frame(watch: Watch) -> tuple[Watch, list[Frame]]:
             frames.append(cameras[0].shoot(sim))
 
     return shoot, frames
-
-
-@dataclasses.dataclass(frozen=True)
-class Group(Generic[Chosen]):
-    """A command that is made of other commands."""
-
-    command: Chosen
-
-    def __call__(self) -> None:
-        """Run the command that was asked for."""
-        self.command()
