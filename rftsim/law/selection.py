@@ -52,14 +52,6 @@ def chosen_on_stack():
     return carray(_columns(), (ALL_COLUMNS * CAPACITY,))
 
 
-@inline_loop
-def copy_run(body, first, n, to, stride):
-    """Copy centres and normals of n triangles from one on to the start of columns of a stride."""
-    for column in range(COLUMN.area):
-        for i in range(n):
-            poke(to, i + column * stride, bodies.at(body, column, first + i))
-
-
 @inline
 def centre(chosen, i):
     """The centre of the i-th chosen triangle [m], (3,)."""

@@ -15,18 +15,7 @@ from rftsim.law.grounds import Ground
 from rftsim.law.laws import Response
 from rftsim.law.layout import PRESSED
 from rftsim.law.leading import reach2
-from rftsim.law.selection import (
-    CAPACITY,
-    LOOK,
-    area,
-    centre,
-    choosing,
-    chosen_on_stack,
-    copy_run,
-    filled_up,
-    next_run,
-    normal,
-)
+from rftsim.law.selection import CAPACITY, LOOK, area, centre, choosing, chosen_on_stack, filled_up, next_run, normal
 from rftsim.law.stress import TINY
 from rftsim.law.vectors import larger
 from rftsim.machine.compiling import inline, inline_loop, merged
@@ -71,19 +60,17 @@ def _force(stress, weight, held):
 
 def deepest(response: Response, ground: Ground) -> Any:
     """Make the largest depth of a body's triangles [m]; any negative number where none is in the sand."""
-    is_relief = ground.is_relief
 
     @inline_loop
     def found(body, frame, sand):
-        field, chosen, most, last = ground.field(sand), chosen_on_stack(), -1e30, 0
+        field, most, last = ground.field(sand), -1e30, 0
         while last < body.count:
             first, last = next_run(body, last, frame, 0.0)
-            if is_relief:
-                copy_run(body, first, last - first, chosen, CAPACITY)
-                ground.settle(chosen, CAPACITY, last - first, frame, field)
-            for i in range(last - first):
-                x, y, z = bodies.centre(body, first + i)
-                most = larger(most, ground.found(chosen, 0, CAPACITY, i, x, y, z, frame)[0] - drop(x, y, z, frame))
+            for i in range(first, last):
+                x, y, z = bodies.centre(body, i)
+                most = larger(
+                    most, ground.look(x, y, z, bodies.normal(body, i), frame, field)[0] - drop(x, y, z, frame)
+                )
         return most
 
     return found

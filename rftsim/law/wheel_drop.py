@@ -8,17 +8,15 @@ from numba import carray, types
 from rftsim.law import body as bodies
 from rftsim.law.frame import behind, point_velocity
 from rftsim.law.free_surface import plane_depth
-from rftsim.law.grounds import ALL_COLUMNS, Ground
+from rftsim.law.grounds import Ground
 from rftsim.law.laws import Response
 from rftsim.law.layout import BLOCK, NO_RIM
 from rftsim.law.leading import may_lead
-from rftsim.law.selection import copy_run
 from rftsim.law.vectors import cross, dot, larger, smaller
 from rftsim.machine.compiling import inline, inline_loop
 from rftsim.machine.memory import on_stack
 
 _angles, _least, _most = (on_stack(BLOCK, types.float64) for _ in range(3))
-_copied = on_stack(ALL_COLUMNS * BLOCK, types.float64)
 
 
 @inline
@@ -48,13 +46,11 @@ def dropped(response: Response, ground: Ground) -> Any:
             angle += 2.0 * np.pi if angle < -np.pi else 0.0
             out[i] = angle if (plane_depth(x, y, z, frame) > 0.0) & leads & (on_rim < NO_RIM) else NO_RIM
         if is_relief:
-            copied = carray(_copied(), (ALL_COLUMNS * BLOCK,))
-            copy_run(body, start, count, copied, BLOCK)
-            ground.settle(copied, BLOCK, count, frame, field)
             for i in range(count):
-                x, y, z = bodies.centre(body, start + i)
-                deep = ground.found(copied, 0, BLOCK, i, x, y, z, frame)[0]
-                out[i] = out[i] if deep > 0.0 else NO_RIM
+                if out[i] < NO_RIM:
+                    x, y, z = bodies.centre(body, start + i)
+                    deep = ground.look(x, y, z, bodies.normal(body, start + i), frame, field)[0]
+                    out[i] = out[i] if deep > 0.0 else NO_RIM
 
     @inline
     def arc(body, frame, field, down):
