@@ -84,6 +84,16 @@ def test_a_print_is_half_as_deep_as_it_was_pressed(print_of_a_foot):
     assert 0.005 < height.max() < 0.010
 
 
+def test_a_foot_that_is_lifted_within_a_cell_leaves_the_depth_that_it_reached():
+    """Its marks are made when it begins to rise, up to a fiftieth of a cell and the step in which it turns."""
+    spacing, deep, speed = 0.02, 0.012, 0.1
+    model, data = driven(FOOT, "z", "0 0 .03", ruts=Ruts(spacing, (1.3, 1.3)))
+    go(model, data, -speed, deep)
+    lowest = data.qpos[0]
+    go(model, data, speed, 0.004)
+    assert -rftsim.ground(model, data).height_at(0.0, 0.0) == pytest.approx(-lowest, abs=0.02 * spacing + 0.002 * speed)
+
+
 def test_the_first_push_is_that_of_undisturbed_sand(print_of_a_foot):
     places, forces = print_of_a_foot[0]
     model, data = driven(FOOT, "z", "0 0 .032", ruts=False)
