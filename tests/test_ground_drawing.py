@@ -316,3 +316,20 @@ def test_terrain_that_is_moved_in_place_is_drawn_where_it_is():
     assert len(own.follow(data)) == len(look.sand_geoms(model))
     points = drawn_vertices(model, model.geom("sand_surface").id)[1:-1, 1:-1]
     assert points[..., 2] == pytest.approx(dunes().height_at(points[..., 0] - 0.7, points[..., 1]), abs=1e-6)
+
+
+@pytest.mark.parametrize(("bright", "is_dimmed"), [(0.1, False), (0.9, True)])
+def test_lights_that_would_wash_the_sand_out_are_dimmed_and_others_are_not(bright, is_dimmed):
+    model = mujoco.MjModel.from_xml_string(f"""
+        <mujoco><visual><headlight ambient="{bright} {bright} {bright}" diffuse="0 0 0"/></visual>
+        <worldbody><light type="directional" dir="0 0 -1" diffuse="{bright} {bright} {bright}"/></worldbody>
+        </mujoco>""")
+    data, scene, camera = mujoco.MjData(model), mujoco.MjvScene(model, 100), mujoco.MjvCamera()
+    mujoco.mj_forward(model, data)
+    mujoco.mjv_updateScene(model, data, mujoco.MjvOption(), None, camera, mujoco.mjtCatBit.mjCAT_ALL, scene)
+    before = [(light.ambient.copy(), light.diffuse.copy()) for light in scene.lights[: scene.nlight]]
+    look.shine(scene)
+    after = [(light.ambient, light.diffuse) for light in scene.lights[: len(before)]]
+    share = look.EXPOSED / (2.0 * bright) if is_dimmed else 1.0
+    for now, then in zip(after, before, strict=True):
+        np.testing.assert_allclose(now, share * np.array(then), rtol=1e-5)

@@ -34,6 +34,8 @@ SUNLIGHT: Final = (0.80, 0.77, 0.71)
 """Its colour."""
 SHADE: Final = 0.6
 """Factor of all other light then."""
+EXPOSED: Final = 1.1
+"""Most light that falls on level ground; with more all lights are dimmed, or the sand would be white."""
 
 
 def sand_geoms(model: mujoco.MjModel) -> dict[int, str]:
@@ -108,7 +110,27 @@ def _grain(side: int) -> "NDArray[np.uint8]":
 
 
 def shine(scene: mujoco.MjvScene) -> None:
-    """Let the sun into a scene in which no light casts shadows, and dim the others."""
+    """Let the sun into a scene in which no light casts shadows, and dim all lights where sand would be washed out."""
+    _let_in_the_sun(scene)
+    most = float(np.max(_on_level_ground(scene)))
+    for i in range(scene.nlight if most > EXPOSED else 0):
+        light = scene.lights[i]
+        for part in (light.ambient, light.diffuse, light.specular):
+            part[:] *= EXPOSED / most
+
+
+def _on_level_ground(scene: mujoco.MjvScene) -> Array:
+    """What light a scene's lights throw on level ground, of which 1 gives things their own colour, (3,)."""
+    total = np.zeros(3)
+    for i in range(scene.nlight):
+        light = scene.lights[i]
+        down = -float(scene.camera[0].forward[2]) if light.headlight else -float(light.dir[2])
+        total += light.ambient + max(down, 0.0) * light.diffuse
+    return total
+
+
+def _let_in_the_sun(scene: mujoco.MjvScene) -> None:
+    """Add the sun where no light casts shadows, and dim the others."""
     lights = [scene.lights[i] for i in range(scene.nlight)]
     if any(light.castshadow for light in lights if not light.headlight) or scene.nlight >= len(scene.lights):
         return
