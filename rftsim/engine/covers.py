@@ -66,14 +66,10 @@ def merge(boxes):
 @exact
 def extent(t, body, surface, out):
     """Fill out with the centre of a body's box and half its size, along the world's axes [m], (6,)."""
-    header, r, at = header_at(surface), t.xmat[9 * body : 9 * body + 9], t.xpos[3 * body : 3 * body + 3]
-    low, high = header.lowest, header.highest
-    out[0], out[1], out[2] = to_world(r, 0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.5 * (low[2] + high[2]))
+    low, high, box = header_at(surface).lowest, header_at(surface).highest, doubles(stack_doubles(6), 6)
     for k in range(3):
-        half = 0.0
-        for axis in range(3):
-            half += 0.5 * abs(r[3 * k + axis]) * (high[axis] - low[axis])
-        out[k], out[3 + k] = out[k] + at[k], half
+        box[k], box[3 + k] = 0.5 * (low[k] + high[k]), 0.5 * (high[k] - low[k])
+    place_box(t.xmat[9 * body : 9 * body + 9], t.xpos[3 * body : 3 * body + 3], box, out)
 
 
 @exact
@@ -96,13 +92,11 @@ def _join_cells(marks, at, out):
 
 @exact
 def add_body(t, body, surface, field, marks, out):
-    """Widen a box by all cells that a body is above, if it is near the sand; whether it is."""
+    """Widen a box by all cells that a body is above, if it is near the sand."""
     at = doubles(stack_doubles(6), 6)
     extent(t, body, surface, at)
-    if not _is_near(field, marks, at, BLOCK_SIDE):
-        return False
-    _join_cells(marks, at, out)
-    return True
+    if _is_near(field, marks, at, BLOCK_SIDE):
+        _join_cells(marks, at, out)
 
 
 @exact
@@ -110,6 +104,9 @@ def add_prints(t, body, surface, field, marks, out):
     """Widen a box by those cells that prints of a body which are near the sand lie above."""
     r, position = t.xmat[9 * body : 9 * body + 9], t.xpos[3 * body : 3 * body + 3]
     header, at = header_at(surface), doubles(stack_doubles(6), 6)
+    extent(t, body, surface, at)
+    if not _is_near(field, marks, at, BLOCK_SIDE):
+        return
     n = int(header.prints)
     count = (n + BLOCK - 1) // BLOCK
     boxes = doubles(surface + 8 * (prints_start(header) + 3 * n), BOX_NUMBERS * count)

@@ -152,16 +152,13 @@ def _gather(model, m, t, address, field, marks, slides_all, boxes):
 
     Those that overlap are joined. Where a body did not move, nothing slides unless all is to.
     """
-    own = doubles(stack_doubles(4), 4)
     for k in range(len(boxes)):
         trace, moves = instance.trace(address, k), boxes[k, 0] > 0.0
         covers.empty(boxes[k])
         if moves:
             trace.travel = 0.0
-            body, surface = instance.body(address, k), instance.surface(model, m, address, k)
-            covers.empty(own)
-            if covers.add_body(t, body, surface, field, marks, own):
-                covers.add_prints(t, body, surface, field, marks, boxes[k])
+            surface = instance.surface(model, m, address, k)
+            covers.add_prints(t, instance.body(address, k), surface, field, marks, boxes[k])
         if moves or slides_all:
             covers.join(boxes[k], trace.unsettled)
             covers.empty(trace.unsettled)
