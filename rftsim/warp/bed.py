@@ -1,0 +1,175 @@
+"""A bed of sand in the worlds of mujoco_warp: its arrays, and the launches that make its force."""
+
+from typing import Any, Final
+
+import mujoco
+import warp as wp
+
+from rftsim.engine import plugin
+from rftsim.errors import SceneError
+from rftsim.law import layout
+from rftsim.law.laws import LAWS, Law, fitted_law
+from rftsim.law.layout import record
+from rftsim.law.tables import monomials
+from rftsim.model.readout import Instance
+from rftsim.warp import equation
+from rftsim.warp.definite import mat66
+from rftsim.warp.force import PARTS, Kernels, Sands, State, kernels_of
+from rftsim.warp.surfaces import put_paths, put_surfaces
+from rftsim.warp.wheel_drop import find_drop
+
+PARAMETERS: Final = ("xi_n", "zeta", "mu_surf", "lambda_", "rho_c", "g", "offset")
+"""Numbers of the sand that may differ from world to world."""
+_kernels: dict[Law, Kernels] = {}
+"""The kernels of each law that was asked for."""
+
+
+class WarpBed:
+    """A bed of sand in many worlds.
+
+    Attributes:
+        name: Its name in the model.
+        is_implicit: Whether its force is that at the end of the step.
+        bodies: Ids of the bodies that feel it.
+        sands: Its sand, arrays of Warp by the names of PARAMETERS, one number for each world or one for all.
+    """
+
+    def __init__(self, model: mujoco.MjModel, bed: Instance, nworld: int) -> None:
+        """Put a bed on the device.
+
+        Raises:
+            SceneError: Its surface is a terrain or remembers ruts, which only the engine plugin knows.
+        """
+        packed = bed.bed
+        if packed.relief or packed.rows:
+            raise SceneError(
+                f"bed {bed.name!r}: on Warp the free surface is a plane without ruts: leave out terrain= and ruts="
+            )
+        self.name, self.bodies, self.nworld = bed.name, list(bed.bodies), nworld
+        self.is_implicit = model.plugin[bed.id] == plugin.register(plugin.IMPLICIT)
+        law = _law_of(packed)
+        if law not in _kernels:
+            _kernels[law] = kernels_of(law)
+        self._kernels, self._has_wheels = _kernels[law], bool(law.dynamic)
+        self._surfaces, self._nlane = put_surfaces(bed.bodies)
+        self._paths = put_paths(model, self.bodies)
+        self.sands = _put_sands(packed)
+        self._has_wheels &= any(record(packed, layout.HEADER).wheel_radius > 0.0 for packed in bed.bodies.values())
+        self._state, self._model = _make_state(nworld, len(bed.bodies), self._nlane, self._paths)
+
+    @property
+    def _over_bodies(self) -> tuple[int, int]:
+        return self.nworld, len(self.bodies)
+
+    def begin(self, m: Any, d: Any) -> None:
+        """Find how the bodies move at the start of a step, and what their wheels left behind."""
+        wp.launch(
+            equation.find_motions,
+            dim=(self.nworld, self._paths.dof.size),
+            inputs=[self._surfaces, self._paths, m.body_rootid, d.xpos, d.subtree_com, d.cdof, self._model],
+        )
+        wp.launch(
+            equation.begin,
+            dim=self._over_bodies,
+            inputs=[self._surfaces, self._paths, d.qvel, d.xmat, self.is_implicit, self._model, self._state],
+        )
+        if self._has_wheels:
+            wp.launch(
+                find_drop, dim=self._over_bodies, inputs=[self._surfaces, self.sands, self._state, d.xpos, d.xmat]
+            )
+
+    def go_on(self, d: Any, velocity: Any) -> None:
+        """Take the twists about which the force is linearised to those at a velocity, (nworld, nv)."""
+        wp.launch(
+            equation.go_on,
+            dim=self._over_bodies,
+            inputs=[self._surfaces, self._paths, velocity, d.xmat, self._model, self._state],
+        )
+
+    def evaluate(self, m: Any, d: Any) -> None:
+        """Evaluate the force, and for the implicit one its derivative."""
+        given = [self._surfaces, self.sands, self._state, d.xpos, d.xmat, self._nlane]
+        threads = (*self._over_bodies, self._nlane)
+        if self.is_implicit:
+            wp.launch(self._kernels.implicit, dim=threads, inputs=given)
+            gather = equation.gather
+        else:
+            wp.launch(self._kernels.explicit, dim=threads, inputs=given)
+            gather = equation.gather_wrenches
+        wp.launch(gather, dim=self._over_bodies, inputs=[self._surfaces, self._state, d.xmat, self._nlane, self._model])
+
+    def add_stiffness(self, m: Any, matrix: Any, out: Any) -> None:
+        """Fill out with a matrix of the mass matrix's entries and the sand's share, (nworld, nC)."""
+        wp.launch(
+            equation.add_stiffness,
+            dim=matrix.shape,
+            inputs=[self._paths, self._state, self._model, m.opt.timestep, matrix, out],
+        )
+
+    def add_force(self, force: Any) -> None:
+        """Add the generalised force at the velocity of the start of the step, (nworld, nv)."""
+        wp.launch(
+            equation.add_force,
+            dim=force.shape,
+            inputs=[self._paths, self._state, self._model, self.is_implicit, force],
+        )
+
+    def read(self, sensors: Any, velocity: Any, sensordata: Any) -> None:
+        """Fill sensors of the wrenches at a velocity; of each its first number and the body's place in `bodies`."""
+        wp.launch(
+            equation.read_wrenches,
+            dim=(self.nworld, sensors.shape[0]),
+            inputs=[self._surfaces, self._paths, self._state, self._model, velocity, self.is_implicit, sensors],
+            outputs=[sensordata],
+        )
+
+    def forget(self, reset: Any) -> None:
+        """Forget the past of the worlds that are reset, (nworld,) of bool."""
+        wp.launch(equation.forget, dim=self._over_bodies, inputs=[reset, self._state, self._model])
+
+
+def _law_of(packed: Any) -> Law:
+    """The law of packed sand."""
+    tables = [tuple(float(x) for x in column) for column in packed.table]
+    for law in LAWS.values():
+        own = [tuple(column) for column in zip(*(term[1] for term in law.table), strict=True)] or [(), (), ()]
+        padded = [column + (0.0,) * (layout.TERMS - len(column)) for column in own]
+        if _place(law) == int(packed.response) and law.dynamic == bool(packed.dynamic) and padded == tables:
+            return law
+    base = next(
+        law for law in LAWS.values() if _place(law) == int(packed.response) and law.dynamic == bool(packed.dynamic)
+    )
+    powers = monomials(3 if len(base.table) == len(monomials(3)) else 4)
+    rows = zip(*tables, strict=True)
+    return fitted_law(tuple(zip(powers, rows, strict=False)), base.name.partition(":")[0] + ":fitted")  # type: ignore[arg-type]
+
+
+def _place(law: Law) -> int:
+    """The place of a law's response among all."""
+    return layout.RESPONSES.index(law.response)
+
+
+def _put_sands(packed: Any) -> Any:
+    """The sand of all worlds, the same in each."""
+    sands = Sands()
+    for name in PARAMETERS:
+        setattr(sands, name, wp.array([float(packed[name])], dtype=float))
+    sands.dynamic = float(packed.dynamic)
+    sands.up, sands.plane = wp.vec3(*map(float, packed.up)), wp.vec3(*map(float, packed.plane))
+    return sands
+
+
+def _make_state(nworld: int, nbody: int, nlane: int, paths: Any) -> tuple[Any, Any]:
+    """What is known of bodies in many worlds, and their linearised wrenches; all zero."""
+    state, model = State(), equation.Model()
+    shape = nworld, nbody
+    state.slow, state.near = wp.zeros(nworld, dtype=float), wp.zeros(shape, dtype=int)
+    state.rear, state.drop = wp.zeros(shape, dtype=wp.vec4), wp.zeros(shape, dtype=float)
+    state.wrench = wp.zeros((*shape, nlane), dtype=wp.spatial_vector)
+    state.parts = wp.zeros((*shape, nlane, PARTS), dtype=wp.mat33)
+    state.twist = wp.zeros(shape, dtype=wp.spatial_vector)
+    for name in ("twist", "wrench", "start", "strain"):
+        setattr(model, name, wp.zeros(shape, dtype=wp.spatial_vector))
+    model.stiffness, model.secant = wp.zeros(shape, dtype=mat66), wp.zeros(shape, dtype=float)
+    model.motion = wp.zeros((nworld, max(paths.dof.size, 1)), dtype=wp.spatial_vector)
+    return state, model
