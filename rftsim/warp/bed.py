@@ -91,7 +91,7 @@ class WarpBed:
         given = [self._surfaces, self.sands, self._state, d.xpos, d.xmat, self._nlane]
         threads = (*self._over_bodies, self._nlane)
         if self.is_implicit:
-            wp.launch(self._kernels.implicit, dim=threads, inputs=given)
+            wp.launch(self._kernels.implicit, dim=threads, inputs=[*given, m.opt.timestep])
             gather = equation.gather
         else:
             wp.launch(self._kernels.explicit, dim=threads, inputs=given)

@@ -29,7 +29,7 @@ def from_blocks(upper: wp.mat33, beside: wp.mat33, lower: wp.mat33):
 def _is_definite(a: mat66):
     """Whether a symmetric matrix is positive definite: Cholesky's factors exist."""
     f = a
-    found = 1
+    found = int(1)
     for i in range(6):
         if found == 1:
             pivot = f[i, i]
@@ -72,7 +72,7 @@ def without_negative(a: mat66):
     out = mat66()
     for i in range(6):
         for k in range(6):
-            total = 0.0
+            total = float(0.0)
             for e in range(6):
                 total += v[i, e] * wp.max(d[e, e], 0.0) * v[k, e]
             out[i, k] = total

@@ -216,7 +216,7 @@ def add_stiffness(
 ):
     """Fill out with a matrix of the mass matrix's entries and h J' K J, over (nworld, nentry)."""
     world, entry = wp.tid()
-    total = 0.0
+    total = float(0.0)
     for at in range(paths.first_of_entry[entry], paths.first_of_entry[entry + 1]):
         row, column = paths.row_motion[at], paths.column_motion[at]
         body = paths.owner[row]
@@ -230,7 +230,7 @@ def add_stiffness(
 def add_force(paths: Paths, state: State, model: Model, is_implicit: bool, force: wp.array2d(dtype=float)):
     """Add the generalised force of the wrenches, of the linearised ones at the start of the step, over (nworld, nv)."""
     world, dof = wp.tid()
-    total = 0.0
+    total = float(0.0)
     for at in range(paths.first_of_dof[dof], paths.first_of_dof[dof + 1]):
         motion = paths.of_dof[at]
         body = paths.owner[motion]

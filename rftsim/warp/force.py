@@ -125,10 +125,15 @@ def depth_of(f: Frame, x: wp.vec3):
 
 
 @wp.func
+def depth_of_box(f: Frame, middle: wp.vec3, half: wp.vec3):
+    """The depth of the deepest corner of a box below the undisturbed sand [m]."""
+    return f.height - wp.dot(f.up, middle) + wp.dot(wp.abs(f.up), half)
+
+
+@wp.func
 def is_clear(f: Frame, middle: wp.vec3, half: wp.vec3):
     """Whether a box lies above the undisturbed sand."""
-    below = wp.dot(wp.abs(f.up), half)
-    return wp.dot(f.up, middle) - below >= f.height
+    return depth_of_box(f, middle, half) <= 0.0
 
 
 @wp.func
@@ -209,16 +214,23 @@ def kernels_of(law: Law) -> Kernels:
         xpos: wp.array2d(dtype=wp.vec3),
         xmat: wp.array2d(dtype=wp.mat33),
         nlane: int,
+        timestep: wp.array(dtype=float),
     ):
         world, body, lane = wp.tid()
         own = surfaces.body[body]
         f = frame_of(sands, state, xpos[world, own], xmat[world, own], world, body)
         low, high = surfaces.lowest[body], surfaces.highest[body]
-        near = wp.where(is_clear(f, 0.5 * (low + high), 0.5 * (high - low)), 0, 1)
+        step = timestep[world % timestep.shape[0]]
+        far = wp.length(wp.max(wp.abs(low), wp.abs(high)))
+        margin = step * (wp.length(f.velocity) + far * wp.length(f.omega))
+        deepest = depth_of_box(f, 0.5 * (low + high), 0.5 * (high - low))
+        near = wp.where(deepest + margin <= 0.0, 0, 1)
         if lane == 0:
             state.near[world, body] = near
         if near == 0:
             return
+        sinking = step * wp.max(-wp.dot(f.velocity, f.up), 0.0)
+        later = step * sinking / (sinking + wp.max(deepest, _TINY))
         medium, edge, bare, around = medium_of(sands, world), Edge(), Edge(), Plane()
         edge.tolerance = surfaces.edge_on[body]
         edge.ramp = _RAMP
@@ -230,13 +242,13 @@ def kernels_of(law: Law) -> Kernels:
         whole_vv, whole_vw, whole_ww = wp.mat33(0.0), wp.mat33(0.0), wp.mat33(0.0)
         along_vv, along_vw, along_ww = wp.mat33(0.0), wp.mat33(0.0), wp.mat33(0.0)
         for block in range(surfaces.first_block[body] + lane, surfaces.first_block[body + 1], nlane):
-            if is_clear(f, surfaces.middle[block], surfaces.half[block]):
+            if depth_of_box(f, surfaces.middle[block], surfaces.half[block]) + margin <= 0.0:
                 continue
             start = surfaces.first[body] + _BLOCK * (block - surfaces.first_block[body])
             for i in range(start, wp.min(start + _BLOCK, surfaces.first[body + 1])):
                 x, n, area = surfaces.centre[i], surfaces.normal[i], surfaces.area[i]
                 v = f.velocity + wp.cross(f.omega, x)
-                deep = depth_of(f, x)
+                deep = depth_of(f, x) - later * wp.dot(v, f.up)
                 speed2 = wp.dot(v, v)
                 if deep <= 0.0 or speed2 <= 0.0:
                     continue
@@ -261,11 +273,12 @@ def kernels_of(law: Law) -> Kernels:
                     wp.outer(one.per_depth - s.per_depth, first) + wp.outer(two.per_depth - s.per_depth, second)
                 )
                 braked = 2.0 * area * s.inertia / wp.max(cosine * speed, _TINY)
+                sunk = -later * share * area * speed * radius * wp.outer(s.per_depth, f.up)
                 width = 0.5 / (radius * _RAMP)
                 press = wp.abs(wp.dot(s.per_depth, m)) * weight * speed
                 jump = -0.5 * press / wp.max(wp.abs(cosine * speed + width), width)
                 slope = wp.where(share > 0.0 and share < 1.0, -press * _RAMP / speed, 0.0)
-                whole = _symmetric(straight + turned) + (braked + jump) * wp.outer(m, m)
+                whole = _symmetric(straight + turned + sunk) + (braked + jump) * wp.outer(m, m)
                 along = (speed * radius) * (speed * radius) * _symmetric(straight) + (jump - slope) * wp.outer(m, m)
                 arm = -wp.skew(x)
                 whole_vv += whole
