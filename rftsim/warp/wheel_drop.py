@@ -38,14 +38,14 @@ def find_drop(
     lowest = wp.atan2(wp.dot(down, wp.cross(axis, start)), wp.dot(down, start))
     first, last = float(_NO_RIM), -float(_NO_RIM)
     for i in range(surfaces.first[body], surfaces.first[body + 1]):
-        x, angle = surfaces.centre[i], surfaces.angle[i]
-        if angle < _NO_RIM and f.height - wp.dot(f.up, x) > 0.0:
-            if wp.dot(surfaces.normal[i], f.velocity + wp.cross(f.omega, x)) > 0.0:
-                angle -= lowest
-                angle -= wp.where(angle > wp.pi, 2.0 * wp.pi, 0.0)
-                angle += wp.where(angle < -wp.pi, 2.0 * wp.pi, 0.0)
-                first = wp.min(first, angle)
-                last = wp.max(last, angle)
+        x, on_rim = surfaces.centre[i], surfaces.angle[i]
+        outward = wp.dot(surfaces.normal[i], f.velocity + wp.cross(f.omega, x))
+        if on_rim < _NO_RIM and f.height - wp.dot(f.up, x) > 0.0 and outward > 0.0:
+            angle = on_rim - lowest
+            angle -= wp.where(angle > wp.pi, 2.0 * wp.pi, 0.0)
+            angle += wp.where(angle < -wp.pi, 2.0 * wp.pi, 0.0)
+            first = wp.min(first, angle)
+            last = wp.max(last, angle)
     if last < first:
         return
     middle = -0.5 * sign * (first + last)
