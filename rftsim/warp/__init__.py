@@ -1,3 +1,9 @@
 """Sand in mujoco_warp, for thousands of worlds on a GPU; of the extra `rftsim[warp]`."""
 
-from rftsim.warp.sand import WarpSand, Worlds, put, without_plugin
+import importlib.util
+
+if any(importlib.util.find_spec(name) is None for name in ("warp", "mujoco_warp")):
+    raise ImportError("rftsim.warp needs mujoco_warp: pip install 'rftsim[warp]'")
+
+from rftsim.warp.bed import PARAMETERS, WarpBed
+from rftsim.warp.sand import WarpSand, Worlds, compile_coupled, put, without_plugin

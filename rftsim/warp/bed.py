@@ -8,9 +8,8 @@ import warp as wp
 from rftsim.engine import plugin
 from rftsim.errors import SceneError
 from rftsim.law import layout
-from rftsim.law.laws import LAWS, Law, fitted_law
-from rftsim.law.layout import record
-from rftsim.law.tables import monomials
+from rftsim.law.laws import CUBIC, QUARTIC, RESPONSES, Response
+from rftsim.law.tables import TABLE_C3, TABLE_C4
 from rftsim.model.readout import Instance
 from rftsim.warp import equation
 from rftsim.warp.definite import mat66
@@ -20,8 +19,8 @@ from rftsim.warp.wheel_drop import find_drop
 
 PARAMETERS: Final = ("xi_n", "zeta", "mu_surf", "lambda_", "rho_c", "g", "offset")
 """Numbers of the sand that may differ from world to world."""
-_kernels: dict[Law, Kernels] = {}
-"""The kernels of each law that was asked for."""
+_kernels: dict[tuple[Response, tuple[tuple[float, ...], ...]], Kernels] = {}
+"""The kernels of each response and table that was asked for."""
 
 
 class WarpBed:
@@ -47,15 +46,33 @@ class WarpBed:
             )
         self.name, self.bodies, self.nworld = bed.name, list(bed.bodies), nworld
         self.is_implicit = model.plugin[bed.id] == plugin.register(plugin.IMPLICIT)
-        law = _law_of(packed)
-        if law not in _kernels:
-            _kernels[law] = kernels_of(law)
-        self._kernels, self._has_wheels = _kernels[law], bool(law.dynamic)
+        self._kernels = _kernels_for(packed)
         self._surfaces, self._nlane = put_surfaces(bed.bodies)
         self._paths = put_paths(model, self.bodies)
         self.sands = _put_sands(packed)
-        self._has_wheels &= any(record(packed, layout.HEADER).wheel_radius > 0.0 for packed in bed.bodies.values())
+        radii = [layout.record(surface, layout.HEADER).wheel_radius for surface in bed.bodies.values()]
+        self._has_wheels = bool(packed.dynamic) and any(radius > 0.0 for radius in radii)
         self._state, self._model = _make_state(nworld, len(bed.bodies), self._nlane, self._paths)
+        self._wrenches = wp.zeros(self._over_bodies, dtype=wp.spatial_vector)
+
+    def vary(self, *names: str) -> None:
+        """Give parameters of the sand a number for each world, in place of one for all.
+
+        They are arrays of Warp then, `sands.xi_n` and the like, (nworld,), to be written in place: `warp.to_torch`
+        shares them. A captured graph reads what is in them, so this comes before the capture.
+
+        Args:
+            *names: Some of PARAMETERS.
+
+        Raises:
+            ValueError: There is no such parameter.
+        """
+        for name in names:
+            if name not in PARAMETERS:
+                raise ValueError(f"no parameter {name!r} of the sand; there are {', '.join(PARAMETERS)}")
+            values = getattr(self.sands, name).numpy()
+            if len(values) == 1:
+                setattr(self.sands, name, wp.full(self.nworld, float(values[0]), dtype=float))
 
     @property
     def _over_bodies(self) -> tuple[int, int]:
@@ -114,39 +131,29 @@ class WarpBed:
             inputs=[self._paths, self._state, self._model, self.is_implicit, force],
         )
 
-    def read(self, sensors: Any, velocity: Any, sensordata: Any) -> None:
-        """Fill sensors of the wrenches at a velocity; of each its first number and the body's place in `bodies`."""
+    def find_wrenches(self, velocity: Any) -> Any:
+        """The wrenches at the end of a step at a velocity, (nworld, nbody) of spatial vectors, force first."""
         wp.launch(
-            equation.read_wrenches,
-            dim=(self.nworld, sensors.shape[0]),
-            inputs=[self._surfaces, self._paths, self._state, self._model, velocity, self.is_implicit, sensors],
-            outputs=[sensordata],
+            equation.find_wrenches,
+            dim=self._over_bodies,
+            inputs=[self._paths, self._state, self._model, velocity, self.is_implicit],
+            outputs=[self._wrenches],
         )
+        return self._wrenches
 
     def forget(self, reset: Any) -> None:
         """Forget the past of the worlds that are reset, (nworld,) of bool."""
         wp.launch(equation.forget, dim=self._over_bodies, inputs=[reset, self._state, self._model])
 
 
-def _law_of(packed: Any) -> Law:
-    """The law of packed sand."""
-    tables = [tuple(float(x) for x in column) for column in packed.table]
-    for law in LAWS.values():
-        own = [tuple(column) for column in zip(*(term[1] for term in law.table), strict=True)] or [(), (), ()]
-        padded = [column + (0.0,) * (layout.TERMS - len(column)) for column in own]
-        if _place(law) == int(packed.response) and law.dynamic == bool(packed.dynamic) and padded == tables:
-            return law
-    base = next(
-        law for law in LAWS.values() if _place(law) == int(packed.response) and law.dynamic == bool(packed.dynamic)
-    )
-    powers = monomials(3 if len(base.table) == len(monomials(3)) else 4)
-    rows = zip(*tables, strict=True)
-    return fitted_law(tuple(zip(powers, rows, strict=False)), base.name.partition(":")[0] + ":fitted")  # type: ignore[arg-type]
-
-
-def _place(law: Law) -> int:
-    """The place of a law's response among all."""
-    return layout.RESPONSES.index(law.response)
+def _kernels_for(packed: Any) -> Kernels:
+    """The kernels of the law of packed sand, made once in a process."""
+    response = RESPONSES[int(packed.response)]
+    terms = {CUBIC: len(TABLE_C3), QUARTIC: len(TABLE_C4)}.get(response, 0)
+    table = tuple(tuple(map(float, column[:terms])) for column in packed.table)
+    if (response, table) not in _kernels:
+        _kernels[response, table] = kernels_of(response, table)
+    return _kernels[response, table]
 
 
 def _put_sands(packed: Any) -> Any:

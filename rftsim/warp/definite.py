@@ -29,7 +29,7 @@ def from_blocks(upper: wp.mat33, beside: wp.mat33, lower: wp.mat33):
 def _is_definite(a: mat66):
     """Whether a symmetric matrix is positive definite: Cholesky's factors exist."""
     f = a
-    found = int(1)
+    found = 1
     for i in range(6):
         if found == 1:
             pivot = f[i, i]

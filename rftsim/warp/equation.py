@@ -285,26 +285,35 @@ def add_damping(
 
 
 @wp.kernel(enable_backward=False)
-def read_wrenches(
-    surfaces: Surfaces,
+def find_wrenches(
     paths: Paths,
     state: State,
     model: Model,
     velocity: wp.array2d(dtype=float),
     is_implicit: bool,
-    sensor: wp.array2d(dtype=int),
-    sensordata: wp.array2d(dtype=float),
+    out: wp.array2d(dtype=wp.spatial_vector),
 ):
-    """Fill the sensors of the wrenches at a velocity, over (nworld, nsensor); of each its first number and its body."""
-    world, k = wp.tid()
-    first, body = sensor[k, 0], sensor[k, 1]
+    """Fill out with the wrenches, of the linearised ones at a velocity, over (nworld, nbody)."""
+    world, body = wp.tid()
     wrench = wp.spatial_vector()
     if state.near[world, body] == 1:
         wrench = model.wrench[world, body]
         if is_implicit:
             wrench = wrench_at(model, world, body, twist_of(paths, model, velocity, world, body))
+    out[world, body] = wrench
+
+
+@wp.kernel(enable_backward=False)
+def read_wrenches(
+    wrenches: wp.array2d(dtype=wp.spatial_vector),
+    sensor: wp.array2d(dtype=int),
+    sensordata: wp.array2d(dtype=float),
+):
+    """Fill the sensors of wrenches, over (nworld, nsensor); of each its first number and its body."""
+    world, k = wp.tid()
+    wrench = wrenches[world, sensor[k, 1]]
     for i in range(6):
-        sensordata[world, first + i] = wrench[i]
+        sensordata[world, sensor[k, 0] + i] = wrench[i]
 
 
 @wp.kernel(enable_backward=False)

@@ -10,7 +10,7 @@ import warp as wp
 
 from rftsim.law import leading
 from rftsim.law.exports import RAMP
-from rftsim.law.laws import Law
+from rftsim.law.laws import Response
 from rftsim.law.layout import BLOCK, NO_RIM
 from rftsim.warp.law import Edge, Medium, Plane, stress_of
 from rftsim.warp.surfaces import Surfaces
@@ -159,9 +159,9 @@ class Kernels(NamedTuple):
     """Wrench that is continuous at rest, and its derivative."""
 
 
-def kernels_of(law: Law) -> Kernels:
-    """Make the kernels of a law."""
-    stress = stress_of(law)
+def kernels_of(response: Response, table: tuple[tuple[float, ...], ...]) -> Kernels:
+    """Make the kernels of a response, with a table of coefficients, see `law.stress_of`."""
+    stress = stress_of(response, table)
 
     @wp.func
     def explicit_triangle(f: Frame, x: wp.vec3, n: wp.vec3, area: float, medium: Medium, edge: Edge, around: Plane):

@@ -4,8 +4,7 @@ from typing import Any
 
 import warp as wp
 
-from rftsim.law.laws import Law
-from rftsim.law.tables import columns
+from rftsim.law.laws import Response
 from rftsim.warp.translate import translate
 
 
@@ -55,13 +54,15 @@ def _stress(per_depth: Any, inertia: float, along: Any):
     return s
 
 
-def stress_of(law: Law) -> Any:
-    """Make a law's stress on a triangle, from n, v, up, frame, medium and edge, for kernels of Warp.
+def stress_of(response: Response, table: tuple[tuple[float, ...], ...]) -> Any:
+    """Make the stress on a triangle, from n, v, up, frame, medium and edge, for kernels of Warp.
 
-    The law's table is made part of the machine code: a fitted one is compiled on its own.
+    Args:
+        response: That of the law.
+        table: Coefficients of f1, f2 and f3, which are made part of the machine code; empty where it has none.
     """
     names = {"Stress": _stress}
-    if law.table:
-        vector = wp.types.vector(length=len(law.table), dtype=wp.float32)
-        names["medium.table"] = tuple(wp.constant(vector(*column)) for column in columns(law.table))
-    return translate(law.response.stress, names)
+    if table[0]:
+        vector = wp.types.vector(length=len(table[0]), dtype=wp.float32)
+        names["medium.table"] = tuple(wp.constant(vector(*column)) for column in table)
+    return translate(response.stress, names)

@@ -17,7 +17,7 @@ from rftsim.model.readout import instances
 from rftsim.warp import equation
 from rftsim.warp.bed import WarpBed
 
-ITERATIONS: Final = 2
+ITERATIONS: Final = 3
 """Linearisations of the sand's force in a step."""
 COUPLING: Final = 1e-6
 """Offset of an inertia from its body's frame by which MuJoCo no longer takes its mass matrix for a diagonal [m]."""
@@ -130,7 +130,21 @@ class WarpSand:
         self._fill_velocity(m, d, d.qacc)
         for bed, sensors in zip(self.beds, self._sensors, strict=True):
             if sensors is not None:
-                bed.read(sensors, self._velocity, d.sensordata)
+                wp.launch(
+                    equation.read_wrenches,
+                    dim=(self.nworld, sensors.shape[0]),
+                    inputs=[bed.find_wrenches(self._velocity), sensors],
+                    outputs=[d.sensordata],
+                )
+
+    def wrenches(self, d: Any) -> list[Any]:
+        """The sand's wrenches in the step that led to data.
+
+        Returns:
+            Of each bed an array of Warp, (nworld, nbody) of spatial vectors for its `bodies`: force [N], then moment
+            about the body's origin [N m], world axes. It is written anew by the next call.
+        """
+        return [bed.find_wrenches(d.qvel) for bed in self.beds]
 
     def reset(self, reset: Any = None) -> None:
         """Forget the past of worlds: call it beside `mujoco_warp.reset_data`.
