@@ -131,7 +131,7 @@ def _time(case: Case, rounds: int, report: Callable[[str], Any]) -> list[Timed]:
     batches = {}
     for threads in THREADS if case.batched else ():
         timers = {
-            ground: _many(model, begun[ground], case.move(begun[ground], BATCH_STEPS), threads)
+            ground: batch_timer(model, begun[ground], case.move(begun[ground], BATCH_STEPS), threads)
             for ground, model in found.items()
         }
         batches[threads] = _in_turn(timers, rounds, lambda: report(f"{case.name}, {case.law}, {SIMULATIONS} at once"))
@@ -206,7 +206,7 @@ def _single(data: mujoco.MjData, begun: mujoco.MjData, spans: list[Span]) -> flo
     return seconds / sum(span.steps for span in spans)
 
 
-def _many(model: mujoco.MjModel, begun: mujoco.MjData, spans: list[Span], threads: int) -> Callable[[], float]:
+def batch_timer(model: mujoco.MjModel, begun: mujoco.MjData, spans: list[Span], threads: int) -> Callable[[], float]:
     """Make a timer of a step of one simulation in a batch [s]: elapsed time over the steps of all."""
     batch = Batch(model, SIMULATIONS, threads)
     if model.nnumeric:

@@ -12,6 +12,7 @@ from rftsim.cli.options import Count, Flag, Folder, Kept
 from rftsim.cli.solver import weigh_solver
 from rftsim.cli.stability import play_hard_cases
 from rftsim.cli.terrain import time_terrain
+from rftsim.cli.worlds import time_worlds
 
 
 @dataclasses.dataclass(frozen=True)
@@ -30,10 +31,12 @@ class Bench:
 
     terrain: the time that terrain and ruts take over a plane.
 
+    warp: the time of many worlds in mujoco_warp, on a GPU where there is one.
+
     Example: rftsim bench stability --plot out
     """
 
-    study: tyro.conf.Positional[Literal["stability", "kernel", "environment", "pareto", "solver", "terrain"]]
+    study: tyro.conf.Positional[Literal["stability", "kernel", "environment", "pareto", "solver", "terrain", "warp"]]
     """What is measured, see above."""
     cases: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ..", help_behavior_hint="")] = ()
     """Hard cases, cases of environment (wheel, go1), or parts of pareto (laws, tolerance); by default all."""
@@ -62,6 +65,8 @@ class Bench:
             compare_speeds(self.cases, self.quick, self.memory, self.plot, self.json)
         elif self.study == "terrain":
             time_terrain(self.quick, self.json)
+        elif self.study == "warp":
+            time_worlds(self.quick, self.json)
         elif self.study == "solver":
             weigh_solver(self.cases, self.scenes, self.quick, self.memory, self.json)
         else:

@@ -6,4 +6,4 @@ if any(importlib.util.find_spec(name) is None for name in ("warp", "mujoco_warp"
     raise ImportError("rftsim.warp needs mujoco_warp: pip install 'rftsim[warp]'")
 
 from rftsim.warp.bed import PARAMETERS, WarpBed
-from rftsim.warp.sand import WarpSand, Worlds, compile_coupled, put, without_plugin
+from rftsim.warp.sand import ITERATIONS, WarpSand, Worlds, compile_coupled, put, without_plugin

@@ -5,11 +5,11 @@ import mujoco_warp as mjw
 import numpy as np
 import pytest
 import warp as wp
-from rftsim_models import parts
 
 import rftsim
 import rftsim.warp
-from rftsim.bench.subjects import SUBJECTS
+from rftsim.bench.quadruped import QUADRUPED
+from rftsim.bench.subjects import SUBJECTS, Subject
 from rftsim.errors import SceneError
 from rftsim.surface.triangles import Array
 
@@ -132,19 +132,36 @@ def test_reset_on_warp_forgets() -> None:
     assert np.abs(again[1] - first[1]).max() < 1e-6
 
 
-def test_a_hexapod_on_warp_goes_the_same_way() -> None:
-    """Half a second of the shipped hexapod's walk, at 5 ms, within 3 % of the way of the engine plugin's."""
-    subject = SUBJECTS["hexapod"]
-    model = subject.stage("rft3d").model
-    data = subject.start(model)
-    worlds = rftsim.warp.put(model, data, njmax=64, nconmax=32)
-    torso = model.body(parts.TORSO).id
-    begun = data.xpos[torso].copy()
-    for _ in range(100):
+def _apart(subject: Subject, h: float, duration: float, iterations: int) -> float:
+    """How far a robot on Warp gets from the engine plugin's at most, over the length of its way."""
+    model = subject.stage(subject.laws[0]).model
+    model.opt.timestep = h
+    data, every = subject.start(model), round(0.02 / h)
+    worlds = rftsim.warp.put(model, subject.start(model), iterations=iterations, njmax=64, nconmax=32)
+    places, apart = [data.qpos[:2].copy()], 0.0
+    for i in range(round(duration / h)):
+        if subject.move is not None and i % every == 0:
+            data.ctrl[:] = subject.move(model, data.time)
+            worlds.d.ctrl.assign(data.ctrl[None].astype("f4"))
         mujoco.mj_step(model, data)
         mjw.step(worlds.m, worlds.d)
-    way = np.linalg.norm(data.qpos[:3] - begun)
-    assert np.linalg.norm(worlds.d.qpos.numpy()[0, :3] - data.qpos[:3]) < 0.03 * way
+        places.append(data.qpos[:2].copy())
+        apart = max(apart, float(np.linalg.norm(worlds.d.qpos.numpy()[0, :2] - data.qpos[:2])))
+    return apart / float(np.linalg.norm(np.diff(places[::every], axis=0), axis=1).sum())
+
+
+def test_a_hexapod_on_warp_goes_the_same_way() -> None:
+    """Half a second of the shipped hexapod's walk at 2 ms, within 1 % of the engine plugin's way."""
+    assert _apart(SUBJECTS["hexapod"], 2e-3, 0.5, rftsim.warp.ITERATIONS) < 0.01
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["wheel", "runner", "hexapod", "quadruped"])
+def test_robots_on_warp_go_the_same_way(name: str) -> None:
+    """Two seconds of each at its own step, 5 ms for the robots, within 1 % of the engine plugin's way."""
+    subject = {**SUBJECTS, "quadruped": QUADRUPED}[name]
+    model = subject.stage(subject.laws[0]).model
+    assert _apart(subject, model.opt.timestep, 2.0, 8) < 0.01
 
 
 def test_sensors_on_warp_read_the_wrench() -> None:
@@ -157,7 +174,7 @@ def test_sensors_on_warp_read_the_wrench() -> None:
 
 
 def test_what_warp_does_not_know_is_refused() -> None:
-    """A scene without sand, a terrain, an integrator, or a mass matrix kept as a diagonal: one line, with the remedy."""
+    """No sand, a terrain, or a mass matrix that is kept as a diagonal: one line, with the remedy."""
     with pytest.raises(SceneError, match="no sand"):
         rftsim.warp.put(mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{BALL}</worldbody></mujoco>"))
     with pytest.raises(SceneError, match="plane without ruts"):
