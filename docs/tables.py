@@ -38,6 +38,8 @@ DEAR = {
     "solver.txt": "rftsim bench solver",
     "pareto.txt": "rftsim bench pareto --cases laws",
     "tolerance.txt": "rftsim bench pareto --cases tolerance",
+    "warp.txt": "rftsim bench warp",
+    "warp-cases.txt": "rftsim bench warp --cases all",
 }
 TABLES = CHEAP | DEAR
 RESULTS = (0, 1)

@@ -44,6 +44,7 @@ class Trial:
     Attributes:
         resting: Time that bodies are left alone for where rest is judged [s].
         h: Time step [s].
+        spec: The model with sand, as it was before it was compiled.
         model: The model with sand.
         data: Its data.
         seconds: Elapsed time of the steps taken [s].
@@ -58,6 +59,7 @@ class Trial:
         sand = options.pop("sand", SAND)
         add_sand(spec, sand, options.pop("law", "rft3d"), force=force, draw=False, **{**WHOLE, **options})
         self.h = h
+        self.spec = spec
         self.model = spec.compile()
         self.data = mujoco.MjData(self.model)
         self.seconds = 0.0

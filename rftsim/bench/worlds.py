@@ -15,7 +15,7 @@ from rftsim.bench.environment import SIMULATIONS, batch_timer
 from rftsim.bench.quadruped import QUADRUPED, trotting
 from rftsim.warp.sand import put, without_plugin
 
-wp.config.quiet = True
+wp.config.log_level = wp.LOG_WARNING
 
 WORLDS: Final = (1, 64, 512, 2048, 4096, 8192)
 """Numbers of worlds on a GPU."""

@@ -12,7 +12,7 @@ from rftsim.cli.options import Count, Flag, Folder, Kept
 from rftsim.cli.solver import weigh_solver
 from rftsim.cli.stability import play_hard_cases
 from rftsim.cli.terrain import time_terrain
-from rftsim.cli.worlds import time_worlds
+from rftsim.cli.worlds import weigh_warp
 
 
 @dataclasses.dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Bench:
 
     terrain: the time that terrain and ruts take over a plane.
 
-    warp: the time of many worlds in mujoco_warp, on a GPU where there is one.
+    warp: the time of many worlds in mujoco_warp, on a GPU where there is one; with cases, hard cases there.
 
     Example: rftsim bench stability --plot out
     """
@@ -39,7 +39,7 @@ class Bench:
     study: tyro.conf.Positional[Literal["stability", "kernel", "environment", "pareto", "solver", "terrain", "warp"]]
     """What is measured, see above."""
     cases: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ..", help_behavior_hint="")] = ()
-    """Hard cases, cases of environment (wheel, go1), or parts of pareto (laws, tolerance); by default all."""
+    """Hard cases (of warp: or all), cases of environment (wheel, go1), or parts of pareto (laws, tolerance)."""
     starts: Count = 1000
     """Random starts, of stability."""
     scenes: Count = 300
@@ -66,7 +66,7 @@ class Bench:
         elif self.study == "terrain":
             time_terrain(self.quick, self.json)
         elif self.study == "warp":
-            time_worlds(self.quick, self.json)
+            weigh_warp(self.cases, self.quick, self.json)
         elif self.study == "solver":
             weigh_solver(self.cases, self.scenes, self.quick, self.memory, self.json)
         else:
