@@ -13,7 +13,8 @@ from rftsim.law.tables import TABLE_C3, TABLE_C4
 from rftsim.model.readout import Instance
 from rftsim.warp import equation
 from rftsim.warp.definite import mat66
-from rftsim.warp.force import PARTS, Kernels, Sands, State, kernels_of
+from rftsim.warp.force import PARTS, Kernels, kernels_of
+from rftsim.warp.frames import Sands, State
 from rftsim.warp.surfaces import put_paths, put_surfaces
 from rftsim.warp.wheel_drop import find_drop
 

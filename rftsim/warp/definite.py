@@ -26,54 +26,74 @@ def from_blocks(upper: wp.mat33, beside: wp.mat33, lower: wp.mat33):
 
 
 @wp.func
+def _eliminated(f: mat66, i: int):
+    """A matrix after the i-th step of Cholesky's elimination."""
+    for row in range(i + 1, 6):
+        share = f[row, i] / f[i, i]
+        for column in range(i + 1, 6):
+            f[row, column] = f[row, column] - share * f[i, column]
+    return f
+
+
+@wp.func
 def _is_definite(a: mat66):
-    """Whether a symmetric matrix is positive definite: Cholesky's factors exist."""
+    """Whether a symmetric matrix is positive definite: all pivots of its elimination are positive."""
     f = a
-    found = 1
     for i in range(6):
-        if found == 1:
-            pivot = f[i, i]
-            if pivot <= 0.0:
-                found = 0
-            else:
-                for r in range(i + 1, 6):
-                    share = f[r, i] / pivot
-                    for c in range(i + 1, 6):
-                        f[r, c] = f[r, c] - share * f[i, c]
-    return found
+        if not f[i, i] > 0.0:
+            return False
+        f = _eliminated(f, i)
+    return True
+
+
+@wp.struct
+class Turned:
+    """A matrix on its way to a diagonal, and the rotations that took it there."""
+
+    matrix: mat66
+    rotation: mat66
+
+
+@wp.func
+def _turned(t: Turned, p: int, q: int):
+    """A matrix after the rotation of Jacobi's method that clears one of its elements."""
+    d, v = t.matrix, t.rotation
+    if wp.abs(d[p, q]) <= 1e-12 * (wp.abs(d[p, p]) + wp.abs(d[q, q])):
+        return t
+    half = 0.5 * (d[q, q] - d[p, p]) / d[p, q]
+    tangent = wp.where(half >= 0.0, 1.0, -1.0) / (wp.abs(half) + wp.sqrt(half * half + 1.0))
+    c = 1.0 / wp.sqrt(tangent * tangent + 1.0)
+    s = tangent * c
+    for k in range(6):
+        x, y = d[k, p], d[k, q]
+        d[k, p] = c * x - s * y
+        d[k, q] = s * x + c * y
+    for k in range(6):
+        x, y, z, w = d[p, k], d[q, k], v[k, p], v[k, q]
+        d[p, k] = c * x - s * y
+        d[q, k] = s * x + c * y
+        v[k, p] = c * z - s * w
+        v[k, q] = s * z + c * w
+    t.matrix = d
+    t.rotation = v
+    return t
 
 
 @wp.func
 def without_negative(a: mat66):
     """A symmetric matrix without the parts that belong to its negative eigenvalues."""
-    if _is_definite(a) == 1:
+    if _is_definite(a):
         return a
-    d = a
-    v = wp.identity(n=6, dtype=float)
-    for _ in range(SWEEPS):
+    t = Turned()
+    t.matrix = a
+    t.rotation = wp.identity(n=6, dtype=float)
+    sweeps = int(SWEEPS)
+    for _ in range(sweeps):
         for p in range(5):
             for q in range(p + 1, 6):
-                if wp.abs(d[p, q]) > 1e-12 * (wp.abs(d[p, p]) + wp.abs(d[q, q])):
-                    half = 0.5 * (d[q, q] - d[p, p]) / d[p, q]
-                    t = wp.where(half >= 0.0, 1.0, -1.0) / (wp.abs(half) + wp.sqrt(half * half + 1.0))
-                    c = 1.0 / wp.sqrt(t * t + 1.0)
-                    s = t * c
-                    for k in range(6):
-                        x, y = d[k, p], d[k, q]
-                        d[k, p] = c * x - s * y
-                        d[k, q] = s * x + c * y
-                    for k in range(6):
-                        x, y = d[p, k], d[q, k]
-                        d[p, k] = c * x - s * y
-                        d[q, k] = s * x + c * y
-                        z, w = v[k, p], v[k, q]
-                        v[k, p] = c * z - s * w
-                        v[k, q] = s * z + c * w
+                t = _turned(t, p, q)
     out = mat66()
-    for i in range(6):
-        for k in range(6):
-            total = float(0.0)
-            for e in range(6):
-                total += v[i, e] * wp.max(d[e, e], 0.0) * v[k, e]
-            out[i, k] = total
+    for e in range(6):
+        axis = wp.transpose(t.rotation)[e]
+        out += wp.max(t.matrix[e, e], 0.0) * wp.outer(axis, axis)
     return out

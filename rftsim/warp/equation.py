@@ -13,7 +13,7 @@ from typing import Final
 import warp as wp
 
 from rftsim.warp.definite import from_blocks, mat66, vec6, without_negative
-from rftsim.warp.force import State
+from rftsim.warp.frames import State
 from rftsim.warp.surfaces import Paths, Surfaces
 
 V_C: Final = wp.constant(1e-4)

@@ -31,7 +31,7 @@ class Edge:
 
 @wp.struct
 class Plane:
-    """What a law reads of a body's frame: the horizontal axis of the plane of motion, body frame."""
+    """The part of a body's frame that a law reads: the horizontal axis of the plane of motion, body frame."""
 
     forward: wp.vec3
 
@@ -62,7 +62,8 @@ def stress_of(response: Response, table: tuple[tuple[float, ...], ...]) -> Any:
         table: Coefficients of f1, f2 and f3, which are made part of the machine code; empty where it has none.
     """
     names = {"Stress": _stress}
-    if table[0]:
-        vector = wp.types.vector(length=len(table[0]), dtype=wp.float32)
+    terms = len(table[-1])
+    if terms:
+        vector = wp.types.vector(length=terms, dtype=wp.float32)
         names["medium.table"] = tuple(wp.constant(vector(*column)) for column in table)
     return translate(response.stress, names)

@@ -97,7 +97,7 @@ def _angles(packed: Array, header: Any, start: int) -> Array:
 
 @wp.struct
 class Paths:
-    """What moves the bodies of a bed, and which entries of the mass matrix that couples."""
+    """The degrees of freedom that move the bodies of a bed, and the entries of the mass matrix that they couple."""
 
     dof: wp.array(dtype=int)
     """The degrees of freedom that move each body, one body after another; a pair of body and one is a motion."""

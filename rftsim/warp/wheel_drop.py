@@ -3,7 +3,8 @@
 import warp as wp
 
 from rftsim.law.layout import NO_RIM
-from rftsim.warp.force import Sands, State, Surfaces, frame_of
+from rftsim.warp.frames import Sands, State, frame_of
+from rftsim.warp.surfaces import Surfaces
 
 _NO_RIM = wp.constant(NO_RIM)
 
