@@ -90,7 +90,7 @@ class WarpBed:
         wp.launch(
             equation.begin,
             dim=self._over_bodies,
-            inputs=[self._surfaces, self._paths, d.qvel, d.xmat, self.is_implicit, self._model, self._state],
+            inputs=[self._surfaces, self._paths, d.time, d.qvel, d.xmat, self.is_implicit, self._model, self._state],
         )
         if self._has_wheels:
             wp.launch(
@@ -153,7 +153,9 @@ def _counterpart(model: mujoco.MjModel, body: int, onto: mujoco.MjModel) -> int:
     name = model.body(body).name
     found = mujoco.mj_name2id(onto, mujoco.mjtObj.mjOBJ_BODY, name)
     if found < 0:
-        raise SceneError(f"body {name!r} feels the sand, but the model that mujoco_warp was given has none of that name")
+        raise SceneError(
+            f"body {name!r} feels the sand, but the model that mujoco_warp was given has none of that name"
+        )
     return int(found)
 
 
@@ -186,7 +188,8 @@ def _make_state(nworld: int, nbody: int, nlane: int, paths: Any) -> tuple[Any, A
     state.wrench = wp.zeros((*shape, nlane), dtype=wp.spatial_vector)
     state.parts = wp.zeros((*shape, nlane, PARTS), dtype=wp.mat33)
     state.twist = wp.zeros(shape, dtype=wp.spatial_vector)
-    for name in ("twist", "wrench", "start", "strain"):
+    model.clock, model.near_before = wp.full(shape, equation.NEVER, dtype=float), wp.zeros(shape, dtype=int)
+    for name in ("twist", "wrench", "start", "strain", "start_before", "strain_before"):
         setattr(model, name, wp.zeros(shape, dtype=wp.spatial_vector))
     model.stiffness, model.secant = wp.zeros(shape, dtype=mat66), wp.zeros(shape, dtype=float)
     model.motion = wp.zeros((nworld, max(paths.dof.size, 1)), dtype=wp.spatial_vector)
