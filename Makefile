@@ -9,7 +9,7 @@ MUJOCO_LOWEST := 3.5.0
 MUJOCO_NEWEST := 4.0.0
 export MUJOCO_GL ?= egl
 
-.PHONY: demo test check unit readme native docs tables pictures notebooks wheel test-slow test-mujoco clean
+.PHONY: demo test check unit readme native docs tables pictures notebooks wheel test-slow test-mujoco test-mjlab clean
 
 demo: $(VENV)/run
 	$(BIN)/rftsim demo
@@ -57,6 +57,10 @@ test-mujoco: test-mujoco-$(MUJOCO_LOWEST) test-mujoco-$(MUJOCO_NEWEST)
 test-mujoco-%: .venv-mujoco-%/ready
 	.venv-mujoco-$*/bin/pytest tests/verification tests/engine
 
+# The example for mjlab, in an environment of its own, as mjlab wants a MuJoCo of its own; warnings there are others'.
+test-mjlab: .venv-mjlab/ready
+	CUDA_VISIBLE_DEVICES= .venv-mjlab/bin/pytest -W default tests/in_mjlab
+
 # What running needs, and then what checking needs.
 $(VENV)/run: pyproject.toml constraints.txt
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "rftsim needs python3 >= 3.11; set PYTHON")'
@@ -78,5 +82,11 @@ $(VENV)/ready: $(VENV)/run
 	.venv-mujoco-$*/bin/python -m pip install --quiet --disable-pip-version-check --no-deps -e .
 	touch $@
 
+.venv-mjlab/ready: pyproject.toml constraints-mjlab.txt
+	test -x .venv-mjlab/bin/python || $(PYTHON) -m venv .venv-mjlab
+	.venv-mjlab/bin/python -m pip install --quiet --disable-pip-version-check --no-compile -c constraints-mjlab.txt \
+		mjlab pytest pytest-benchmark hypothesis -e '.[warp]'
+	touch $@
+
 clean:
-	rm -rf .venv .venv-mujoco-* out
+	rm -rf .venv .venv-mujoco-* .venv-mjlab out

@@ -34,22 +34,24 @@ class WarpBed:
         sands: Its sand, arrays of Warp by the names of PARAMETERS, one number for each world or one for all.
     """
 
-    def __init__(self, model: mujoco.MjModel, bed: Instance, nworld: int) -> None:
-        """Put a bed on the device.
+    def __init__(self, model: mujoco.MjModel, bed: Instance, nworld: int, onto: mujoco.MjModel) -> None:
+        """Put a bed of a model on the device, for a model with the same bodies, which may be the same.
 
         Raises:
-            SceneError: Its surface is a terrain or remembers ruts, which only the engine plugin knows.
+            SceneError: Its surface is a terrain or remembers ruts, which only the engine plugin knows; or a body that
+                feels it is missing.
         """
         packed = bed.bed
         if packed.relief or packed.rows:
             raise SceneError(
                 f"bed {bed.name!r}: on Warp the free surface is a plane without ruts: leave out terrain= and ruts="
             )
-        self.name, self.bodies, self.nworld = bed.name, list(bed.bodies), nworld
+        self.name, self.nworld = bed.name, nworld
+        self.bodies = list(bed.bodies) if onto is model else [_counterpart(model, body, onto) for body in bed.bodies]
         self.is_implicit = model.plugin[bed.id] == plugin.register(plugin.IMPLICIT)
         self._kernels = _kernels_for(packed)
-        self._surfaces, self._nlane = put_surfaces(bed.bodies)
-        self._paths = put_paths(model, self.bodies)
+        self._surfaces, self._nlane = put_surfaces(dict(zip(self.bodies, bed.bodies.values(), strict=True)))
+        self._paths = put_paths(onto, self.bodies)
         self.sands = _put_sands(packed)
         radii = [layout.record(surface, layout.HEADER).wheel_radius for surface in bed.bodies.values()]
         self._has_wheels = bool(packed.dynamic) and any(radius > 0.0 for radius in radii)
@@ -89,7 +91,7 @@ class WarpBed:
         wp.launch(
             equation.begin,
             dim=self._over_bodies,
-            inputs=[self._surfaces, self._paths, d.qvel, d.xmat, self.is_implicit, self._model, self._state],
+            inputs=[self._surfaces, self._paths, d.time, d.qvel, d.xmat, self.is_implicit, self._model, self._state],
         )
         if self._has_wheels:
             wp.launch(
@@ -147,6 +149,17 @@ class WarpBed:
         wp.launch(equation.forget, dim=self._over_bodies, inputs=[reset, self._state, self._model])
 
 
+def _counterpart(model: mujoco.MjModel, body: int, onto: mujoco.MjModel) -> int:
+    """The id in another model of the body of the same name."""
+    name = model.body(body).name
+    found = mujoco.mj_name2id(onto, mujoco.mjtObj.mjOBJ_BODY, name)
+    if found < 0:
+        raise SceneError(
+            f"body {name!r} feels the sand, but the model that mujoco_warp was given has none of that name"
+        )
+    return int(found)
+
+
 def _kernels_for(packed: Any) -> Kernels:
     """The kernels of the law of packed sand, made once in a process."""
     response = RESPONSES[int(packed.response)]
@@ -176,7 +189,8 @@ def _make_state(nworld: int, nbody: int, nlane: int, paths: Any) -> tuple[Any, A
     state.wrench = wp.zeros((*shape, nlane), dtype=wp.spatial_vector)
     state.parts = wp.zeros((*shape, nlane, PARTS), dtype=wp.mat33)
     state.twist = wp.zeros(shape, dtype=wp.spatial_vector)
-    for name in ("twist", "wrench", "start", "strain"):
+    model.clock, model.near_before = wp.full(shape, equation.NEVER, dtype=float), wp.zeros(shape, dtype=int)
+    for name in ("twist", "wrench", "start", "strain", "start_before", "strain_before"):
         setattr(model, name, wp.zeros(shape, dtype=wp.spatial_vector))
     model.stiffness, model.secant = wp.zeros(shape, dtype=mat66), wp.zeros(shape, dtype=float)
     model.motion = wp.zeros((nworld, max(paths.dof.size, 1)), dtype=wp.spatial_vector)

@@ -20,6 +20,8 @@ V_C: Final = wp.constant(1e-4)
 """Speed v_c [m/s] below which a triangle's stress falls to zero."""
 LIMIT: Final = wp.constant(10.0)
 """The largest strain over v_c; the sand then bears 0.995 of its strength at rest."""
+NEVER: Final = wp.constant(-1.0)
+"""A time before all steps [s]."""
 _TINY: Final = wp.constant(1e-30)
 
 
@@ -41,6 +43,12 @@ class Model:
     """How far the derivative is to be the secant along the motion, 0 to 1."""
     motion: wp.array2d(dtype=wp.spatial_vector)
     """The twist by each motion of Paths, (nworld, nmotion)."""
+    clock: wp.array2d(dtype=float)
+    """The time of the step that was begun last [s]; NEVER before the first."""
+    start_before: wp.array2d(dtype=wp.spatial_vector)
+    strain_before: wp.array2d(dtype=wp.spatial_vector)
+    near_before: wp.array2d(dtype=int)
+    """V0, S and whether a body may be in the sand, as the step before it left them."""
 
 
 @wp.func
@@ -101,10 +109,21 @@ def secant_for(change: float, speed: float):
     return wp.clamp(wp.max(change / wp.max(speed, _TINY), 2.0 - 0.5 * speed / (LIMIT * V_C)), 0.0, 1.0)
 
 
+@wp.func
+def keep_past(model: Model, state: State, world: int, body: int, time: float):
+    """Keep what the last step left, so that a step that is begun again, as `mujoco_warp.forward` does, is the same."""
+    if model.clock[world, body] != time:
+        model.clock[world, body] = time
+        model.start_before[world, body] = model.start[world, body]
+        model.strain_before[world, body] = model.strain[world, body]
+        model.near_before[world, body] = state.near[world, body]
+
+
 @wp.kernel(enable_backward=False)
 def begin(
     surfaces: Surfaces,
     paths: Paths,
+    time: wp.array(dtype=float),
     qvel: wp.array2d(dtype=float),
     xmat: wp.array2d(dtype=wp.mat33),
     is_implicit: bool,
@@ -114,17 +133,18 @@ def begin(
     """Begin a step at its own velocity, over (nworld, nbody); of the implicit force, with what the last step left."""
     world, body = wp.tid()
     twist, length = twist_of(paths, model, qvel, world, body), surfaces.gyration[body]
-    change = size_of(twist - model.start[world, body], length)
+    keep_past(model, state, world, body, time[world])
+    change = size_of(twist - model.start_before[world, body], length)
     model.start[world, body] = twist
     state.twist[world, body] = twist
     if is_implicit:
         turn = xmat[world, surfaces.body[body]]
-        back, strain = wp.transpose(turn), model.strain[world, body]
+        back, strain = wp.transpose(turn), model.strain_before[world, body]
         v = wp.spatial_top(strain) + back * wp.spatial_top(twist)
         w = wp.spatial_bottom(strain) + back * wp.spatial_bottom(twist)
         speed = size_of(wp.spatial_vector(v, w), length)
         share = wp.min(1.0, LIMIT * V_C / wp.max(speed, _TINY))
-        if state.near[world, body] == 0:
+        if model.near_before[world, body] == 0:
             share = 0.0
         model.strain[world, body] = wp.spatial_vector(share * v, share * w)
         left = 1.0 - share
@@ -321,6 +341,7 @@ def forget(reset: wp.array(dtype=bool), state: State, model: Model):
     """Forget the past of the worlds that are reset, over (nworld, nbody)."""
     world, body = wp.tid()
     if reset[world]:
+        model.clock[world, body] = NEVER
         model.strain[world, body] = wp.spatial_vector()
         model.wrench[world, body] = wp.spatial_vector()
         model.stiffness[world, body] = mat66()

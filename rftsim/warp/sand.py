@@ -32,20 +32,35 @@ class WarpSand:
         iterations: Linearisations of the implicit force in a step, at least 1.
     """
 
-    def __init__(self, model: mujoco.MjModel, nworld: int, iterations: int = ITERATIONS) -> None:
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        nworld: int,
+        iterations: int = ITERATIONS,
+        onto: mujoco.MjModel | None = None,
+    ) -> None:
         """Put the sand of a model on Warp's device.
 
         Args:
             model: A compiled model with sand.
             nworld: Number of worlds.
             iterations: Linearisations of the implicit force in a step.
+            onto: The model that mujoco_warp was given, where another made it: its bodies have the names of those that
+                feel the sand, and its user sensors `<body>_sand` of six numbers are filled with their wrenches.
+
+        Raises:
+            SceneError: The model has no sand, or sand that Warp does not know; or a body of it is not in the other.
         """
         found = instances(model)
         if not found:
             raise SceneError("the model has no sand: put it there with rftsim.add_sand before it is compiled")
         self.nworld, self.iterations = nworld, iterations
-        self.beds = [WarpBed(model, bed, nworld) for bed in found]
-        self._sensors = [_sensors_of(model, bed.id, own.bodies) for bed, own in zip(found, self.beds, strict=True)]
+        self.beds = [WarpBed(model, bed, nworld, onto or model) for bed in found]
+        if onto is None:
+            self._sensors = [_sensors_of(model, bed.id, own.bodies) for bed, own in zip(found, self.beds, strict=True)]
+        else:
+            self._sensors = [_sensors_named_for(onto, own.bodies) for own in self.beds]
+        model = onto or model
         shape = nworld, model.nv
         self._smooth, self._acceleration, self._velocity = (wp.zeros(shape, dtype=float) for _ in range(3))
         self._damped, self._matrix = (wp.zeros((nworld, model.nC), dtype=float) for _ in range(2))
@@ -240,6 +255,17 @@ def _sensors_of(model: mujoco.MjModel, instance: int, bodies: "list[int]") -> An
         (int(model.sensor_adr[i]), bodies.index(int(model.sensor_objid[i])))
         for i in np.flatnonzero(model.sensor_plugin == instance)
         if int(model.sensor_objid[i]) in bodies
+    ]
+    return wp.array(np.array(found), dtype=int) if found else None
+
+
+def _sensors_named_for(model: mujoco.MjModel, bodies: "list[int]") -> Any:
+    """The same of the user sensors that are named for the wrench on a body."""
+    names = [f"{model.body(body).name}_sand" for body in bodies]
+    found = [
+        (int(model.sensor_adr[i]), names.index(model.sensor(i).name))
+        for i in np.flatnonzero((model.sensor_type == mujoco.mjtSensor.mjSENS_USER) & (model.sensor_dim == 6))
+        if model.sensor(i).name in names
     ]
     return wp.array(np.array(found), dtype=int) if found else None
 
