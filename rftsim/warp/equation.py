@@ -22,6 +22,8 @@ LIMIT: Final = wp.constant(10.0)
 """The largest strain over v_c; the sand then bears 0.995 of its strength at rest."""
 NEVER: Final = wp.constant(-1.0)
 """A time before all steps [s]."""
+SHORT: Final = wp.constant(0.9)
+"""The share of a motion's power against the sand after which a guess at the end of the step goes no further."""
 _TINY: Final = wp.constant(1e-30)
 
 
@@ -119,6 +121,19 @@ def keep_past(model: Model, state: State, world: int, body: int, time: float):
         model.near_before[world, body] = state.near[world, body]
 
 
+@wp.func
+def before_rest(wrench: wp.spatial_vector, twist: wp.spatial_vector, change: wp.spatial_vector):
+    """The share of a change after which a motion against a wrench is all but stopped; 1 where it does not stop.
+
+    A motion that the sand would drive is none: it is the next guess's to stay short of that.
+    """
+    power, gain = wp.dot(wrench, twist), wp.dot(wrench, change)
+    share = float(1.0)
+    if power < 0.0 and power + gain > (1.0 - SHORT) * power:
+        share = wp.min(-SHORT * power / gain, 1.0)
+    return share
+
+
 @wp.kernel(enable_backward=False)
 def begin(
     surfaces: Surfaces,
@@ -166,12 +181,14 @@ def go_on(
     """Take the model's twist to that at a velocity, over (nworld, nbody)."""
     world, body = wp.tid()
     twist = twist_of(paths, model, velocity, world, body)
-    turn, strain, length = xmat[world, surfaces.body[body]], model.strain[world, body], surfaces.gyration[body]
-    model.twist[world, body] = twist
-    twist += wp.spatial_vector(turn * wp.spatial_top(strain), turn * wp.spatial_bottom(strain))
-    change = size_of(twist - state.twist[world, body], length)
-    state.twist[world, body] = twist
-    model.secant[world, body] = secant_for(change, size_of(twist, length))
+    turn, held, length = xmat[world, surfaces.body[body]], model.strain[world, body], surfaces.gyration[body]
+    strain = wp.spatial_vector(turn * wp.spatial_top(held), turn * wp.spatial_bottom(held))
+    last = state.twist[world, body]
+    whole = twist + strain - last
+    change = before_rest(model.wrench[world, body], last, whole) * whole
+    model.twist[world, body] = last + change - strain
+    state.twist[world, body] = last + change
+    model.secant[world, body] = secant_for(size_of(change, length), size_of(last + change, length))
 
 
 @wp.kernel(enable_backward=False)

@@ -113,9 +113,12 @@ class Sinking:
 def _sinking(surfaces: Surfaces, f: Frame, body: int, step: float):
     """Find how a body sinks within a step."""
     s, low, high = Sinking(), surfaces.lowest[body], surfaces.highest[body]
-    s.deepest = depth_of_box(f, 0.5 * (low + high), 0.5 * (high - low))
+    corner = wp.vec3()
+    for k in range(3):
+        corner[k] = wp.where(f.up[k] > 0.0, low[k], high[k])
+    s.deepest = f.height - wp.dot(f.up, corner)
     s.margin = step * (wp.length(f.velocity) + wp.length(wp.max(wp.abs(low), wp.abs(high))) * wp.length(f.omega))
-    by = step * wp.max(-wp.dot(f.velocity, f.up), 0.0)
+    by = step * wp.max(-wp.dot(f.velocity + wp.cross(f.omega, corner), f.up), 0.0)
     s.later = step * by / (by + wp.max(s.deepest, _TINY))
     return s
 
