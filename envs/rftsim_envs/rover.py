@@ -38,6 +38,7 @@ class RoverConfig(Config):
         distance: Range of the goal's distance, drawn for each episode [m].
         sector_deg: Largest angle between the goal and straight ahead at the start [deg].
         arrival: Reward for reaching the goal.
+        failure: Price of digging in or tipping over: a rover that is lost is worth less than one that waits.
         digging: Weight of the digging in the reward.
         energy: Weight of the power in the reward.
     """
@@ -51,6 +52,7 @@ class RoverConfig(Config):
     distance: tuple[float, float] = (1.0, 3.0)
     sector_deg: float = 60.0
     arrival: float = 5.0
+    failure: float = 5.0
     digging: float = 0.5
     energy: float = 0.5
 
@@ -81,9 +83,9 @@ class Rover(Task):
 
     Wheels are in the order of `rftsim_models.rover.WHEELS`. The slip speed of one is that of its rim less that of its
     side of the torso.
-    Reward: arrival, once; and per second: progress to the goal / 0.408 m/s - energy P / (m g 0.408 m/s) - digging d, P
-    the drives' positive power, a mean over the control step, and d the wheels' mean slip speed over 0.408 m/s, times
-    1 / (1 + (v / 0.05 m/s)^2) for the torso's speed v.
+    Reward: arrival or - failure, once; and per second: progress to the goal / 0.408 m/s - energy P / (m g 0.408 m/s)
+    - digging d, P the drives' positive power, a mean over the control step, and d the wheels' mean slip speed over
+    0.408 m/s, times 1 / (1 + (v / 0.05 m/s)^2) for the torso's speed v.
     The episode ends in success 0.2 m from the goal, and in failure where the torso leans 60 deg from the ground's
     normal, or a hub is less than a fifth of its wheel's radius above the ground.
 
@@ -153,6 +155,7 @@ class Rover(Task):
         return {
             "progress": progress(moment.before[:, :2], moment.qpos[:, :2], moment.command) / moment.period / TOP_SPEED,
             "arrival": np.where(self.reached(moment), c.arrival / moment.period, 0.0),
+            "failure": np.where(self.failed(moment), -c.failure / moment.period, 0.0),
             "power": -c.energy * moment.power / (self.weight * TOP_SPEED),
             "digging": -c.digging * digging(slip_speed, speed) / TOP_SPEED,
         }
