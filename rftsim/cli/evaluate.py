@@ -161,8 +161,14 @@ def _transfer(scores: "dict[Path, list[Score]]", names: dict[Path, str], grounds
         for actor in actors:
             by_ground = {one.ground: one for one in own if one.actor == actor}
             name = names[group] if actor == "policy" else f"{names[group].split(' ')[0]}, {actor}"
-            rows.append([name, *(_spread(by_ground[g]) if g in by_ground else "-" for g in grounds)])
+            rows.append([name, *(_crossed(by_ground[g]) if g in by_ground else "-" for g in grounds)])
     return rows
+
+
+def _crossed(one: "Score") -> str:
+    """The return, and the share of the episodes that ended early in failure, if any did."""
+    early = 100.0 * one.mean("early")
+    return _spread(one) + (f", {early:.3g} % fail" if early > 0.0 else "")
 
 
 def _report(one: "Score") -> dict[str, Any]:

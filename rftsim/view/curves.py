@@ -15,17 +15,17 @@ class Curve(Protocol):
 
     @property
     def name(self) -> str:
-        """What sets these runs apart."""
+        """The settings that set these runs apart from the others."""
         ...
 
     @property
     def steps(self) -> Any:
-        """Control steps, (k,)."""
+        """The numbers of control steps after which returns were noted, (k,)."""
         ...
 
     @property
     def returns(self) -> Any:
-        """Return of each run after so many steps, (nrun, k)."""
+        """The return of each run after so many steps, (nrun, k)."""
         ...
 
 

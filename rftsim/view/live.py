@@ -120,7 +120,7 @@ class Live:
             self.step()
 
     def step(self) -> None:
-        """Go on by a tick."""
+        """Let the simulation go on by a tick."""
         mujoco.mj_step(self.model, self.data)
 
     def restart(self) -> None:

@@ -14,7 +14,7 @@ class Curve(NamedTuple):
     """The runs of one setting, which differ in their seed, as far as all of them are trained."""
 
     name: str
-    """What sets these runs apart: `KEY=VALUE,...`, empty where nothing is varied."""
+    """The settings that set these runs apart, `KEY=VALUE,...`; empty where nothing is varied."""
     steps: Array
     """Control steps after each update, (k,)."""
     returns: Array

@@ -5,6 +5,7 @@ import mujoco
 from rftsim.view.cameras import framing
 from rftsim.view.live import Live
 from rftsim_envs.env import SandEnv
+from rftsim_envs.episodes import Observation
 from rftsim_envs.tally import Tally
 from rftsim_envs.training.actors import Maker
 
@@ -27,7 +28,7 @@ class LiveEpisodes(Live):
         self._env, self._seed = env, seed
         self._actor = maker(env.episodes)
         self.ended: list[dict[str, float]] = []
-        self._reset()
+        self._seen, self._steps, self._tally = self._reset(), 0, Tally(1)
         super().__init__(env.model, lambda: env.data)
         self.tick = env.config.period
 
@@ -43,7 +44,7 @@ class LiveEpisodes(Live):
     def restart(self) -> None:
         """Begin the next episode, in the same data, on sand as strong as the keys have made it."""
         self.ended.append(self._tally.take(0))
-        self._reset()
+        self._seen, self._steps, self._tally = self._reset(), 0, Tally(1)
         self.strengthen(self.strength)
 
     def aim(self) -> mujoco.MjvCamera:
@@ -58,6 +59,6 @@ class LiveEpisodes(Live):
         number = ("episode", f"{len(self.ended)}, of seed {self._seed + len(self.ended)}")
         return [number, ("return", f"{self._tally.so_far(0):.3g}"), *super().state()]
 
-    def _reset(self) -> None:
+    def _reset(self) -> Observation:
         self._env.reset(seed=self._seed + len(self.ended))
-        self._seen, self._steps, self._tally = self._env.episodes.observation(), 0, Tally(1)
+        return self._env.episodes.observation()
