@@ -79,10 +79,12 @@ class Rover(Task):
     | angular velocity, in the torso's axes | 3 | rad/s |
     | rates of the wheels | 6 | 6 rad/s |
     | slip speeds of the wheels | 6 | 0.408 m/s |
+    | sinkages of the wheels | 6 | outer radius |
     | last action | 2 | - |
 
     Wheels are in the order of `rftsim_models.rover.WHEELS`. The slip speed of one is that of its rim less that of its
-    side of the torso.
+    side of the torso, and its sinkage its outer radius less the height of its hub above the ground: how far a wheel
+    sinks at rest tells whether the sand carries it, before it turns.
     Reward: arrival or - failure, once; and per second: progress to the goal / 0.408 m/s - energy P / (m g 0.408 m/s)
     - digging d, P the drives' positive power, a mean over the control step, and d the wheels' mean slip speed over
     0.408 m/s, times 1 / (1 + (v / 0.05 m/s)^2) for the torso's speed v.
@@ -90,7 +92,7 @@ class Rover(Task):
     normal, or a hub is less than a fifth of its wheel's radius above the ground.
 
     `info`: `speed`, over the ground [m/s], `distance` to the goal [m], `slip`, mean over the wheels of what rim and
-    torso differ in, over the faster, `sinkage` of the deepest wheel, outer radius less height of the hub [m], and what
+    torso differ in, over the faster, `sinkage` of the deepest wheel [m], and what
     all tasks tell.
     """
 
@@ -130,7 +132,7 @@ class Rover(Task):
         return ROVER.rate * np.where(SIDES > 0, action[:, :1], action[:, 1:])
 
     def observe(self, moment: Moment) -> Array:
-        """The observation of the class's table, (n, 26)."""
+        """The observation of the class's table, (n, 32)."""
         turn, away = moment.qpos[:, 3:7], moment.command - moment.qpos[:, :2]
         bearing = np.arctan2(away[:, 1], away[:, 0]) - yaw_of(turn)
         velocity, rates = to_body(turn, moment.qvel[:, :3]), moment.qvel[:, self._rates]
@@ -144,6 +146,7 @@ class Rover(Task):
                 moment.qvel[:, 3:6],
                 rates / ROVER.rate,
                 (RADIUS * rates - self._passing(moment)) / TOP_SPEED,
+                1.0 - self._hub_heights(moment) / RADIUS,
                 moment.action,
             ]
         )
@@ -163,7 +166,8 @@ class Rover(Task):
     def failed(self, moment: Moment) -> Flags:
         """Whether the torso has tipped over or a wheel is dug in, (n,)."""
         upright = -to_body(moment.qpos[:, 3:7], np.broadcast_to(DOWN, (len(moment.qpos), 3)))[:, 2]
-        return (upright < TIPPED) | (self._lowest(moment) < BURIED * RADIUS)
+        buried: Flags = self._hub_heights(moment).min(axis=1) < BURIED * RADIUS
+        return (upright < TIPPED) | buried
 
     def reached(self, moment: Moment) -> Flags:
         """Whether the torso is within ARRIVED of the goal, (n,)."""
@@ -179,7 +183,7 @@ class Rover(Task):
             "speed": self.speed(moment),
             "distance": self._distance(moment),
             "slip": slip,
-            "sinkage": RADIUS - self._lowest(moment),
+            "sinkage": RADIUS - self._hub_heights(moment).min(axis=1),
         }
 
     def speed(self, moment: Moment) -> Array:
@@ -189,10 +193,10 @@ class Rover(Task):
     def _distance(self, moment: Moment) -> Array:
         return length(moment.command - moment.qpos[:, :2])
 
-    def _lowest(self, moment: Moment) -> Array:
-        """Height of the lowest hub above the ground [m], (n,)."""
+    def _hub_heights(self, moment: Moment) -> Array:
+        """Heights of the hubs above the ground [m], (n, 6)."""
         x, y, z = np.moveaxis(moment.sensors[:, self._hubs], 2, 0)
-        height: Array = (z - moment.relief.height(x, y)).min(axis=1)
+        height: Array = z - moment.relief.height(x, y)
         return height
 
     def _passing(self, moment: Moment) -> Array:

@@ -110,6 +110,26 @@ def test_a_seed_gives_one_policy(finished, tmp_path):
     assert not equal(parameters(finished / "policy.zip"), parameters(tmp_path / "other" / "policy.zip"))
 
 
+def test_a_run_starts_with_the_policy_of_another(finished, tmp_path):
+    """The network is that one until the first update, which learns nothing at a rate that is all but zero."""
+    still = TINY | {"steps": 124, "learning_rate": 1e-30, "start": str(finished)}
+    ppo.train(make_plan(TASK, SHORT | {"strength": (0.5, 2.0)}, still), tmp_path / "next")
+    before, after = parameters(finished / "policy.zip"), parameters(tmp_path / "next" / "policy.zip")
+    assert all(np.allclose(before[name], after[name], rtol=0.0, atol=1e-12) for name in before)
+    for start, words in ((tmp_path / "none", "has no policy yet"), (finished, "cannot take over the policy")):
+        with pytest.raises(TrainingError, match=words):
+            ppo.train(make_plan(TASK, SHORT, TINY | {"layers": (9,), "start": str(start)}), tmp_path / "other")
+    assert not (tmp_path / "other").exists()
+
+
+@pytest.mark.parametrize("change", [{"sway": 8}, {"sway": 8, "normalise": True}])
+def test_exploration_that_sways_trains_a_policy_that_plays(change, tmp_path):
+    plan = make_plan(TASK, SHORT, TINY | change)
+    ppo.train(plan, tmp_path)
+    ended = evaluate.play(TASK, plan.settings, actors.trained(Folder(tmp_path)), 2, seed=0, threads=1)
+    assert [one["l"] for one in ended] == [STEPS, STEPS]
+
+
 def test_a_stopped_run_goes_on_from_its_last_update(tmp_path):
     plan, calls = make_plan(TASK, SHORT, TINY), []
 
