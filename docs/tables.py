@@ -47,7 +47,7 @@ TRAINED = {
     "transfer-quadruped.md": f"rftsim evaluate {POLICIES} --on {SANDS} --markdown",
     "evaluate-quadruped.md": "rftsim evaluate out/train/quadruped-sands --markdown",
     "evaluate-go1.md": "rftsim evaluate out/train/go1-sands --markdown",
-    "evaluate-rover.md": "rftsim evaluate out/train/rover-sands --markdown",
+    "evaluate-rover.md": "rftsim evaluate out/train/rover --markdown",
 }
 TABLES = CHEAP | DEAR | TRAINED
 RESULTS = (0, 1)

@@ -28,6 +28,8 @@ TIPPED: Final = 0.5
 """Cosine of the torso's lean from the ground's normal below which it has tipped over."""
 BURIED: Final = 0.2
 """Height of a hub above the ground, over its wheel's outer radius, below which the wheel is dug in."""
+LET_GO: Final = 0.25
+"""The same, at which the drives have let go of the wheels where they are guarded."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -39,6 +41,9 @@ class RoverConfig(Config):
         sector_deg: Largest angle between the goal and straight ahead at the start [deg].
         arrival: Reward for reaching the goal.
         failure: Price of digging in or tipping over: a rover that is lost is worth less than one that waits.
+        guard: Height of the deepest hub above the ground, over its wheel's outer radius, from which the drives slow
+            down in proportion, until they stand still at LET_GO: a rover whose wheels have sunk waits to be told
+            another way, and does not bury itself. At LET_GO or less there is no guard.
         digging: Weight of the digging in the reward.
         energy: Weight of the power in the reward.
     """
@@ -53,6 +58,7 @@ class RoverConfig(Config):
     sector_deg: float = 60.0
     arrival: float = 5.0
     failure: float = 5.0
+    guard: float = 0.4
     digging: float = 0.5
     energy: float = 0.5
 
@@ -128,8 +134,13 @@ class Rover(Task):
         return np.array([distance * np.cos(bearing), distance * np.sin(bearing)])
 
     def controls(self, action: Array, moment: Moment) -> Array:
-        """Rates of the wheels [rad/s], (n, 6): those of a side share one."""
-        return ROVER.rate * np.where(SIDES > 0, action[:, :1], action[:, 1:])
+        """Rates of the wheels [rad/s], (n, 6): those of a side share one, and all slow down where one has sunk."""
+        asked: Array = ROVER.rate * np.where(SIDES > 0, action[:, :1], action[:, 1:])
+        room = self.config.guard - LET_GO
+        if room <= 0.0:
+            return asked
+        height = self._hub_heights(moment).min(axis=1) / RADIUS
+        return asked * np.clip((height - LET_GO) / room, 0.0, 1.0)[:, None]
 
     def observe(self, moment: Moment) -> Array:
         """The observation of the class's table, (n, 32)."""

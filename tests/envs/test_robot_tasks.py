@@ -91,7 +91,7 @@ def test_rover_stays_where_it_is(ground, slope):
 
 def test_rover_that_only_spins_its_wheels_digs_in():
     """In loose poppy seeds opposite rates bury the wheels: failed, and worth less than nothing."""
-    env = SandVectorEnv("Rover", 1, sand="poppy-seeds", slope_deg=0.0)
+    env = SandVectorEnv("Rover", 1, sand="poppy-seeds", slope_deg=0.0, guard=0.0)
     total, info = run(env, lambda _: np.array([[1.0, -1.0]]), 40)
     assert total[0] < 0.0
     assert info["sinkage"][0] > (1.0 - BURIED) * ROVER_RADIUS
@@ -133,7 +133,7 @@ def test_actions_follow_with_their_time_constant():
 
 def test_a_rover_that_digs_in_pays_for_it():
     """The price once, in the step in which it fails, where a rover that stands still pays nothing."""
-    env = SandEnv("Rover", sand="poppy-seeds", slope_deg=0.0, failure=7.0)
+    env = SandEnv("Rover", sand="poppy-seeds", slope_deg=0.0, failure=7.0, guard=0.0)
     env.reset(seed=0)
     ended, paid = False, []
     while not ended:
@@ -141,6 +141,16 @@ def test_a_rover_that_digs_in_pays_for_it():
         paid.append(info["reward/failure"])
     assert paid[-1] == pytest.approx(-7.0)
     assert not any(paid[:-1])
+
+
+@pytest.mark.parametrize("action", [(1.0, 1.0), (1.0, -1.0), (-1.0, 0.3)])
+def test_a_guarded_rover_does_not_bury_itself(action):
+    """On poppy seeds and on sand weaker still the drives let go before a wheel is dug in, whatever is asked."""
+    env = SandVectorEnv("Rover", 2, sand="poppy-seeds", strength=(0.8, 1.0), slope_deg=0.0, duration=4.0)
+    total, info = run(env, lambda _: np.tile(action, (2, 1)), 80)
+    assert (info["sinkage"] < (1.0 - BURIED) * ROVER_RADIUS).all()
+    assert (info["sinkage"] > 0.6 * ROVER_RADIUS).all(), "they have sunk as far as the guard lets them"
+    assert (total > -2.0).all()
 
 
 def test_rovers_passing_speed():
