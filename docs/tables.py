@@ -46,7 +46,6 @@ SANDS = "'sand,half as strong,twice as strong,dunes,poppy-seeds,glass-beads,medi
 TRAINED = {
     "transfer-quadruped.md": f"rftsim evaluate {POLICIES} --on {SANDS} --markdown",
     "evaluate-quadruped.md": "rftsim evaluate out/train/quadruped-sands --markdown",
-    "evaluate-go1.md": "rftsim evaluate out/train/go1-sands --markdown",
     "evaluate-rover.md": "rftsim evaluate out/train/rover --markdown",
 }
 TABLES = CHEAP | DEAR | TRAINED

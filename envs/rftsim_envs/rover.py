@@ -74,7 +74,8 @@ class Rover(Task):
     """A rover of Sojourner's size (11.2 kg, six grousered wheels on rockers and bogies), steered by skidding.
 
     Action, 2 numbers: rates of the left and of the right wheels, -1 to 1 for -6 to 6 rad/s. The wheels of a side share
-    one, as in all skid steering: what they could do against each other would only dig.
+    one, as in all skid steering: what they could do against each other would only dig. All slow down where one has sunk
+    (`guard`).
 
     | observation | size | unit |
     |---|---|---|
