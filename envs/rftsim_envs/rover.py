@@ -141,7 +141,8 @@ class Rover(Task):
         if room <= 0.0:
             return asked
         height = self._hub_heights(moment).min(axis=1) / RADIUS
-        return asked * np.clip((height - LET_GO) / room, 0.0, 1.0)[:, None]
+        asked *= np.clip((height - LET_GO) / room, 0.0, 1.0)[:, None]
+        return asked
 
     def observe(self, moment: Moment) -> Array:
         """The observation of the class's table, (n, 32)."""

@@ -25,6 +25,7 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import DummyVecEnv
 
 import rftsim
+from rftsim.cli import evaluate as results
 from rftsim.cli import main
 from rftsim.cli.train import interruptible
 
@@ -382,6 +383,16 @@ def test_a_policy_is_scored_on_grounds(finished, tmp_path, capsys):
     for one in report[str(finished)]:
         assert one["ended_early"] == 0.0
         assert one["which"].endswith("rad/s") == (one["actor"] == "open loop")
+
+
+def test_the_share_that_arrives_is_told_where_any_does():
+    one = {"r": 1.0, "early": 0.0, "reached": 1.0}
+    for episodes, told in (
+        ([one, one | {"reached": 0.0}], ["arrived [%]", "50"]),
+        ([one | {"reached": 0.0}], ["early [%]", "0"]),
+    ):
+        head, row = results._grid([evaluate.Score("sand", evaluate.POLICY, episodes)], False)
+        assert [head[-1], row[-1]] == told
 
 
 def test_several_runs_make_a_table_of_transfer(finished, tmp_path, capsys):
