@@ -117,8 +117,7 @@ class Episodes:
         if wanted.shape != self._action.shape or not np.isfinite(wanted).all():
             raise ValueError(f"the action must be finite and of shape {self._action.shape}, not {action!r}")
         self._before = self._qpos.copy()
-        share = self.task.config.following
-        self._last, self._action = self._action, (1.0 - share) * self._action + share * np.clip(wanted, -1.0, 1.0)
+        self._last, self._action = self._action, np.clip(wanted, -1.0, 1.0)
         self._ctrl[:] = self.task.controls(self._action, self._moment(self._before, np.zeros(len(wanted))))
 
     def conclude(self, power: Array) -> Outcome:

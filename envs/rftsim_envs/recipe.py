@@ -47,10 +47,7 @@ class Training:
         vf_coef: Weight of the value's error.
         max_grad_norm: Largest norm of a gradient; longer ones are shortened to it.
         layers: Units in each hidden layer (tanh) of the policy and of the value, which share none.
-        log_std_init: Log of the actions' standard deviation at the start; with `sway` of the weights of what is seen.
-        sway: Control steps for which exploration leans the same way: its noise is a linear function of the policy's
-            last layer, drawn anew after so many steps (generalised state-dependent exploration). With 0 each action
-            has noise of its own, which jitters.
+        log_std_init: Log of the actions' standard deviation at the start.
         normalise: Let the network see observations less their mean and over their standard deviation, which are learnt
             from all that was collected, and kept in the policy.
         start: Folder of a run whose policy is the first one, so that what it can do on easy ground need not be learnt
@@ -71,7 +68,6 @@ class Training:
     max_grad_norm: float = 0.5
     layers: tuple[int, ...] = (64, 64)
     log_std_init: float = -0.5
-    sway: int = 0
     normalise: bool = False
     start: str = ""
 
@@ -88,8 +84,6 @@ class Training:
             )
         if max(self.layers) > WIDEST or len(self.layers) > DEEPEST:
             raise TrainingError(f"there are at most {DEEPEST} layers of at most {WIDEST} units, not {self.layers}")
-        if self.sway < 0:
-            raise TrainingError(f"sway is zero or a number of control steps, not {self.sway}")
         if self.learning_rate > 1.0 or abs(self.log_std_init) > FARTHEST_LOG_STD:
             raise TrainingError(f"learning_rate is at most 1, and log_std_init within {FARTHEST_LOG_STD:g} of zero")
         if not (0.0 < self.gamma <= 1.0 and 0.0 <= self.gae_lambda <= 1.0):

@@ -59,9 +59,6 @@ class Config:
             along x and y. Otherwise it is hidden.
         history: Number of control steps, the present one and those before it, whose observations make up one, the
             latest at its end: from what was done and what came of it, a policy can tell which sand it is on.
-        smooth: Time constant with which the robot's actions follow those that are asked for [s], zero for at once. They
-            are what is observed and rewarded. Noise with which a policy explores is averaged so: wheels that jitter dig
-            in, and teach nothing on loose sand, whatever the policy.
         timestep: Time step of the physics [s].
         period: Duration of a control step [s]; a multiple of the timestep.
         duration: Duration of an episode, after which it is truncated [s].
@@ -82,7 +79,6 @@ class Config:
     scan: int = 0
     observe_ground: bool = False
     history: int = 1
-    smooth: float = 0.0
     timestep: float = 0.005
     period: float = 0.02
     duration: float = 10.0
@@ -105,8 +101,6 @@ class Config:
             raise ConfigError(f"period = {self.period:g} s must be a multiple of timestep = {self.timestep:g} s")
         if not 1 <= self.history <= MOST_HISTORY:
             raise ConfigError(f"history must be from 1 to {MOST_HISTORY} control steps, not {self.history}")
-        if not self.smooth >= 0.0:
-            raise ConfigError(f"smooth must be zero or a positive time, not {self.smooth:g} s")
         check_solution(self.tolerance, self.iterations, ConfigError)
         make_sand(self.sand)
         self._check_terrain()
@@ -125,11 +119,6 @@ class Config:
     def has_dunes(self) -> bool:
         """Whether the ground has the relief of dunes."""
         return self.terrain == "dunes" and self.amplitude > 0.0
-
-    @property
-    def following(self) -> float:
-        """Share by which actions come nearer to those that are asked for in a control step [-], 1 for at once."""
-        return -math.expm1(-self.period / self.smooth) if self.smooth else 1.0
 
     @property
     def substeps(self) -> int:
@@ -158,7 +147,7 @@ class Moment(NamedTuple):
     command: Array
     """Numbers that tell what is asked in this episode, (n, ncommand)."""
     action: Array
-    """Action that was taken, smoothed, within -1 and 1, and zero at an episode's start, (n, naction)."""
+    """Action that was taken, within -1 and 1, and zero at an episode's start, (n, naction)."""
     last: Array
     """Action of the control step before, (n, naction)."""
     power: Array

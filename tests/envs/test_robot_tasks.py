@@ -10,7 +10,7 @@ from rftsim_envs.quadruped import Quadruped
 from rftsim_envs.rover import BURIED, Rover, digging, progress
 from rftsim_envs.rover import RADIUS as ROVER_RADIUS
 from rftsim_envs.walking import closeness
-from rftsim_models.rover import ROVER, build_rover
+from rftsim_models.rover import build_rover
 
 from rftsim import add_sand, wrenches
 from rftsim.run.run import run as simulate
@@ -120,17 +120,6 @@ def test_no_slip_lets_the_rover_cross_loose_sand(sand, crosses):
     assert (max(pull(sand, slip) for slip in (0.1, 0.2, 0.3, 0.5)) > 0.0) == crosses
 
 
-def test_actions_follow_with_their_time_constant():
-    """As a first order lag does, 1 - exp(-t / smooth) of what is asked from rest; with zero at once."""
-    for smooth, share in ((0.5, -np.expm1(-3 * 0.05 / 0.5)), (0.0, 1.0)):
-        env = SandEnv("Rover", smooth=smooth)
-        env.reset(seed=0)
-        for _ in range(3):
-            seen, *_ = env.step(np.array([1.0, -1.0]))
-        np.testing.assert_allclose(seen[-2:], [share, -share], rtol=1e-6)
-        np.testing.assert_allclose(env.data.ctrl[[0, 3]], np.array([share, -share]) * ROVER.rate, rtol=1e-6)
-
-
 def test_a_rover_that_digs_in_pays_for_it():
     """The price once, in the step in which it fails, where a rover that stands still pays nothing."""
     env = SandEnv("Rover", sand="poppy-seeds", slope_deg=0.0, failure=7.0, guard=0.0)
@@ -205,7 +194,6 @@ def test_pure_rewards():
     [
         ("GrouserWheel", {"speed": (0.5, 0.1)}, "speed must be a range"),
         ("GrouserWheel", {"drawbar": (-1, 1)}, "drawbar must be a range"),
-        ("Rover", {"smooth": -1}, "smooth must be zero or a positive time"),
         ("GrouserWheel", {"spread": 0}, "spread must be positive"),
         ("Quadruped", {"forward": (1, 0)}, "forward must be a range"),
         ("Quadruped", {"turning_spread": 0}, "turning_spread must be positive"),

@@ -123,14 +123,6 @@ def test_a_run_starts_with_the_policy_of_another(finished, tmp_path):
     assert not (tmp_path / "other").exists()
 
 
-@pytest.mark.parametrize("change", [{"sway": 8}, {"sway": 8, "normalise": True}])
-def test_exploration_that_sways_trains_a_policy_that_plays(change, tmp_path):
-    plan = make_plan(TASK, SHORT, TINY | change)
-    ppo.train(plan, tmp_path)
-    ended = evaluate.play(TASK, plan.settings, actors.trained(Folder(tmp_path)), 2, seed=0, threads=1)
-    assert [one["l"] for one in ended] == [STEPS, STEPS]
-
-
 def test_a_stopped_run_goes_on_from_its_last_update(tmp_path):
     plan, calls = make_plan(TASK, SHORT, TINY), []
 

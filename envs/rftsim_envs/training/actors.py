@@ -27,9 +27,7 @@ def trained(folder: Folder) -> Maker:
     training, parameters = folder.plan().training, read_policy(folder)
 
     def make(episodes: Episodes) -> Actor:
-        policy = ActorCriticPolicy(
-            *spaces(episodes), ConstantSchedule(0.0), use_sde=training.sway > 0, **network(training)
-        )
+        policy = ActorCriticPolicy(*spaces(episodes), ConstantSchedule(0.0), **network(training))
         take_over(policy, parameters, folder)
         policy.set_training_mode(False)
 

@@ -113,8 +113,6 @@ def make_model(training: Training, env: SandVecEnv, seed: int) -> PPO:
         ent_coef=training.ent_coef,
         vf_coef=training.vf_coef,
         max_grad_norm=training.max_grad_norm,
-        use_sde=training.sway > 0,
-        sde_sample_freq=training.sway,
         policy_kwargs=network(training),
         seed=seed,
         device="cpu",
