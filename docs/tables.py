@@ -2,7 +2,7 @@
 
 python docs/tables.py             # all that take less than a minute each: `make tables`
 python docs/tables.py --all       # the dear ones too, an hour or two: a quiet machine is worth waiting for
-python docs/tables.py NAME ...    # some: kernel.txt validate-ruts.md
+python docs/tables.py NAME ...    # some: kernel.txt validate-ruts.md; those of policies, which docs/training.md trains
 
 A text file begins with its command, and a Markdown file ends with it. A table whose command fails stays as it was;
 `rftsim validate` ends with 1 where a row fails, which is a result.
@@ -41,7 +41,14 @@ DEAR = {
     "warp.txt": "rftsim bench warp",
     "warp-cases.txt": "rftsim bench warp --cases all",
 }
-TABLES = CHEAP | DEAR
+POLICIES = "out/train/quadruped-rigid out/train/quadruped-sand out/train/quadruped-sands"
+SANDS = "'sand,half as strong,twice as strong,dunes,poppy-seeds,glass-beads,medium-sand,rigid'"
+TRAINED = {
+    "transfer-quadruped.md": f"rftsim evaluate {POLICIES} --on {SANDS} --markdown",
+    "evaluate-quadruped.md": "rftsim evaluate out/train/quadruped-sands --markdown",
+    "evaluate-rover.md": "rftsim evaluate out/train/rover --markdown",
+}
+TABLES = CHEAP | DEAR | TRAINED
 RESULTS = (0, 1)
 """Exit codes of a command that has printed its table."""
 
@@ -73,7 +80,7 @@ def main() -> None:
     asked = parser.parse_args()
     for name in set(asked.names) - set(TABLES):
         parser.error(f"no table {name!r}; tables are {', '.join(TABLES)}")
-    for name in asked.names or (TABLES if asked.all else CHEAP):
+    for name in asked.names or (CHEAP | DEAR if asked.all else CHEAP):
         began = time.perf_counter()
         write(name)
         print(f"{name}: {TABLES[name]}, {time.perf_counter() - began:.0f} s", flush=True)

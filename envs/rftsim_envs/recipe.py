@@ -50,6 +50,8 @@ class Training:
         log_std_init: Log of the actions' standard deviation at the start.
         normalise: Let the network see observations less their mean and over their standard deviation, which are learnt
             from all that was collected, and kept in the policy.
+        start: Folder of a run whose policy is the first one, so that what it can do on easy ground need not be learnt
+            anew on hard ground; empty for a policy that can do nothing yet.
     """
 
     steps: int = 1_000_000
@@ -67,6 +69,7 @@ class Training:
     layers: tuple[int, ...] = (64, 64)
     log_std_init: float = -0.5
     normalise: bool = False
+    start: str = ""
 
     def __post_init__(self) -> None:
         convert_fields(self, TrainingError)

@@ -28,6 +28,8 @@ TIPPED: Final = 0.5
 """Cosine of the torso's lean from the ground's normal below which it has tipped over."""
 BURIED: Final = 0.2
 """Height of a hub above the ground, over its wheel's outer radius, below which the wheel is dug in."""
+LET_GO: Final = 0.25
+"""The same, at which the drives have let go of the wheels where they are guarded."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -38,6 +40,10 @@ class RoverConfig(Config):
         distance: Range of the goal's distance, drawn for each episode [m].
         sector_deg: Largest angle between the goal and straight ahead at the start [deg].
         arrival: Reward for reaching the goal.
+        failure: Price of digging in or tipping over: a rover that is lost is worth less than one that waits.
+        guard: Height of the deepest hub above the ground, over its wheel's outer radius, from which the drives slow
+            down in proportion, until they stand still at LET_GO: a rover whose wheels have sunk waits to be told
+            another way, and does not bury itself. At LET_GO or less there is no guard.
         digging: Weight of the digging in the reward.
         energy: Weight of the power in the reward.
     """
@@ -51,6 +57,8 @@ class RoverConfig(Config):
     distance: tuple[float, float] = (1.0, 3.0)
     sector_deg: float = 60.0
     arrival: float = 5.0
+    failure: float = 5.0
+    guard: float = 0.4
     digging: float = 0.5
     energy: float = 0.5
 
@@ -66,7 +74,8 @@ class Rover(Task):
     """A rover of Sojourner's size (11.2 kg, six grousered wheels on rockers and bogies), steered by skidding.
 
     Action, 2 numbers: rates of the left and of the right wheels, -1 to 1 for -6 to 6 rad/s. The wheels of a side share
-    one, as in all skid steering: what they could do against each other would only dig.
+    one, as in all skid steering: what they could do against each other would only dig. All slow down where one has sunk
+    (`guard`).
 
     | observation | size | unit |
     |---|---|---|
@@ -77,18 +86,20 @@ class Rover(Task):
     | angular velocity, in the torso's axes | 3 | rad/s |
     | rates of the wheels | 6 | 6 rad/s |
     | slip speeds of the wheels | 6 | 0.408 m/s |
+    | sinkages of the wheels | 6 | outer radius |
     | last action | 2 | - |
 
     Wheels are in the order of `rftsim_models.rover.WHEELS`. The slip speed of one is that of its rim less that of its
-    side of the torso.
-    Reward: arrival, once; and per second: progress to the goal / 0.408 m/s - energy P / (m g 0.408 m/s) - digging d, P
-    the drives' positive power, a mean over the control step, and d the wheels' mean slip speed over 0.408 m/s, times
-    1 / (1 + (v / 0.05 m/s)^2) for the torso's speed v.
+    side of the torso, and its sinkage its outer radius less the height of its hub above the ground: how far a wheel
+    sinks at rest tells whether the sand carries it, before it turns.
+    Reward: arrival or - failure, once; and per second: progress to the goal / 0.408 m/s - energy P / (m g 0.408 m/s)
+    - digging d, P the drives' positive power, a mean over the control step, and d the wheels' mean slip speed over
+    0.408 m/s, times 1 / (1 + (v / 0.05 m/s)^2) for the torso's speed v.
     The episode ends in success 0.2 m from the goal, and in failure where the torso leans 60 deg from the ground's
     normal, or a hub is less than a fifth of its wheel's radius above the ground.
 
     `info`: `speed`, over the ground [m/s], `distance` to the goal [m], `slip`, mean over the wheels of what rim and
-    torso differ in, over the faster, `sinkage` of the deepest wheel, outer radius less height of the hub [m], and what
+    torso differ in, over the faster, `sinkage` of the deepest wheel [m], and what
     all tasks tell.
     """
 
@@ -124,11 +135,17 @@ class Rover(Task):
         return np.array([distance * np.cos(bearing), distance * np.sin(bearing)])
 
     def controls(self, action: Array, moment: Moment) -> Array:
-        """Rates of the wheels [rad/s], (n, 6): those of a side share one."""
-        return ROVER.rate * np.where(SIDES > 0, action[:, :1], action[:, 1:])
+        """Rates of the wheels [rad/s], (n, 6): those of a side share one, and all slow down where one has sunk."""
+        asked: Array = ROVER.rate * np.where(SIDES > 0, action[:, :1], action[:, 1:])
+        room = self.config.guard - LET_GO
+        if room <= 0.0:
+            return asked
+        height = self._hub_heights(moment).min(axis=1) / RADIUS
+        asked *= np.clip((height - LET_GO) / room, 0.0, 1.0)[:, None]
+        return asked
 
     def observe(self, moment: Moment) -> Array:
-        """The observation of the class's table, (n, 26)."""
+        """The observation of the class's table, (n, 32)."""
         turn, away = moment.qpos[:, 3:7], moment.command - moment.qpos[:, :2]
         bearing = np.arctan2(away[:, 1], away[:, 0]) - yaw_of(turn)
         velocity, rates = to_body(turn, moment.qvel[:, :3]), moment.qvel[:, self._rates]
@@ -142,6 +159,7 @@ class Rover(Task):
                 moment.qvel[:, 3:6],
                 rates / ROVER.rate,
                 (RADIUS * rates - self._passing(moment)) / TOP_SPEED,
+                1.0 - self._hub_heights(moment) / RADIUS,
                 moment.action,
             ]
         )
@@ -153,6 +171,7 @@ class Rover(Task):
         return {
             "progress": progress(moment.before[:, :2], moment.qpos[:, :2], moment.command) / moment.period / TOP_SPEED,
             "arrival": np.where(self.reached(moment), c.arrival / moment.period, 0.0),
+            "failure": np.where(self.failed(moment), -c.failure / moment.period, 0.0),
             "power": -c.energy * moment.power / (self.weight * TOP_SPEED),
             "digging": -c.digging * digging(slip_speed, speed) / TOP_SPEED,
         }
@@ -160,7 +179,8 @@ class Rover(Task):
     def failed(self, moment: Moment) -> Flags:
         """Whether the torso has tipped over or a wheel is dug in, (n,)."""
         upright = -to_body(moment.qpos[:, 3:7], np.broadcast_to(DOWN, (len(moment.qpos), 3)))[:, 2]
-        return (upright < TIPPED) | (self._lowest(moment) < BURIED * RADIUS)
+        buried: Flags = self._hub_heights(moment).min(axis=1) < BURIED * RADIUS
+        return (upright < TIPPED) | buried
 
     def reached(self, moment: Moment) -> Flags:
         """Whether the torso is within ARRIVED of the goal, (n,)."""
@@ -176,7 +196,7 @@ class Rover(Task):
             "speed": self.speed(moment),
             "distance": self._distance(moment),
             "slip": slip,
-            "sinkage": RADIUS - self._lowest(moment),
+            "sinkage": RADIUS - self._hub_heights(moment).min(axis=1),
         }
 
     def speed(self, moment: Moment) -> Array:
@@ -186,10 +206,10 @@ class Rover(Task):
     def _distance(self, moment: Moment) -> Array:
         return length(moment.command - moment.qpos[:, :2])
 
-    def _lowest(self, moment: Moment) -> Array:
-        """Height of the lowest hub above the ground [m], (n,)."""
+    def _hub_heights(self, moment: Moment) -> Array:
+        """Heights of the hubs above the ground [m], (n, 6)."""
         x, y, z = np.moveaxis(moment.sensors[:, self._hubs], 2, 0)
-        height: Array = (z - moment.relief.height(x, y)).min(axis=1)
+        height: Array = z - moment.relief.height(x, y)
         return height
 
     def _passing(self, moment: Moment) -> Array:

@@ -32,6 +32,10 @@ class Tally:
             sums = self._sums.setdefault(name, np.zeros(len(share)))
             np.copyto(sums, values if name in LAST else sums + values.astype(float), where=share)
 
+    def so_far(self, i: int) -> float:
+        """Return of simulation i since its episode's start [-]."""
+        return float(self._return[i])
+
     def take(self, i: int) -> dict[str, float]:
         """Give what simulation i's episode came to, and let its next one start from nothing.
 

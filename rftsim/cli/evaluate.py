@@ -24,7 +24,10 @@ if TYPE_CHECKING:
 MOST_EPISODES = 10_000
 """Most episodes on a ground, which are simulated side by side."""
 NUMBERS = {"speed": "speed [m/s]", "error": "off by [m/s]", "cost_of_transport": "CoT", "early": "early [%]"}
+NUMBERS |= {"reached": "arrived [%]"}
 """Headings of what is printed beside the return, where it is measured, by name."""
+SHARES = ("early", "reached")
+"""Those that are shares of the episodes; of arrival where there is any."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -134,13 +137,15 @@ def _spread(one: "Score") -> str:
 
 def _grid(scores: "list[Score]", baseline: bool) -> list[list[str]]:
     measured = [name for name in NUMBERS if not all(math.isnan(one.mean(name)) for one in scores)]
+    if not any(one.mean("reached") > 0.0 for one in scores):
+        measured.remove("reached")
     rows = [
         ["ground", "return", *(NUMBERS[name] for name in measured), *(["random", "best open loop"] if baseline else [])]
     ]
     for one in scores:
         if one.actor != "policy":
             continue
-        numbers = [100.0 * one.mean(name) if name == "early" else one.mean(name) for name in measured]
+        numbers = [100.0 * one.mean(name) if name in SHARES else one.mean(name) for name in measured]
         others = {other.actor: other for other in scores if other.ground == one.ground}
         more = [_other(others.get(name)) for name in ("random", "open loop")] if baseline else []
         cells = ["-" if math.isnan(number) else f"{number:.3g}" for number in numbers]
@@ -161,8 +166,14 @@ def _transfer(scores: "dict[Path, list[Score]]", names: dict[Path, str], grounds
         for actor in actors:
             by_ground = {one.ground: one for one in own if one.actor == actor}
             name = names[group] if actor == "policy" else f"{names[group].split(' ')[0]}, {actor}"
-            rows.append([name, *(_spread(by_ground[g]) if g in by_ground else "-" for g in grounds)])
+            rows.append([name, *(_crossed(by_ground[g]) if g in by_ground else "-" for g in grounds)])
     return rows
+
+
+def _crossed(one: "Score") -> str:
+    """The return, and the share of the episodes that ended early in failure, if any did."""
+    early = 100.0 * one.mean("early")
+    return _spread(one) + (f", {early:.3g} % fail" if early > 0.0 else "")
 
 
 def _report(one: "Score") -> dict[str, Any]:

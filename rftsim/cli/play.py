@@ -13,9 +13,11 @@ from rftsim.cli.extra import needing
 from rftsim.cli.options import Count, File, Flag, Number
 from rftsim.cli.output import make_table, print_json, print_written
 from rftsim.cli.settings import Settings, read_settings
+from rftsim.cli.view import print_keys
 from rftsim.errors import RftsimError
 from rftsim.files import check_writable, replacing
 from rftsim.view.cameras import SIZE
+from rftsim.view.live import watch
 
 if TYPE_CHECKING:
     from rftsim_envs.env import SandEnv
@@ -45,7 +47,7 @@ class Play:
     episodes: Count = 1
     """Number of episodes."""
     seconds: Number = None
-    """Longest time of an episode [s], at which it is cut."""
+    """Longest time of an episode [s], at which it is cut; with --live, after which the window closes."""
     seed: Count = 0
     """Episode k is seeded with seed + k."""
     set: Settings = ()
@@ -56,6 +58,8 @@ class Play:
     """Write a film, .mp4."""
     picture: File = None
     """Picture of four moments, with tractions, .png."""
+    live: Flag = False
+    """Watch one episode after the other in MuJoCo's viewer, until it is closed: with pushes, and stronger sand."""
     json: Flag = False
     """Print JSON."""
 
@@ -63,12 +67,14 @@ class Play:
         """Play the episodes, show them, and print what they came to."""
         with needing("train"):
             from rftsim_envs.env import SandEnv
-            from rftsim_envs.training import play
             from rftsim_envs.training.folder import Folder, make_plan
         if self.episodes < 1 or self.seed < 0 or (self.seconds is not None and not 0.0 < self.seconds <= LONGEST):
             raise RftsimError(
                 f"episodes must be at least 1, seed zero or more, and seconds positive, {LONGEST:g} at most"
             )
+        paths = [path for path in (self.record, self.video, self.picture) if path]
+        if self.live and (paths or self.episodes > 1):
+            raise RftsimError("--live goes on until its window is closed, and writes no files: play again without it")
         folder = Folder(self.run)
         plan = folder.plan() if folder.exists else make_plan(self.run, read_settings(self.set))
         who = self.actions or ("policy" if folder.exists else "random")
@@ -79,14 +85,7 @@ class Play:
             given = plan.settings | read_settings(self.set)
             env = SandEnv(plan.task, "rgb_array" if self.video else None, *SIZE, **given)
             stack.callback(env.close)
-            watchers = self._watchers(env, stack)
-
-            def watch(info: Mapping[str, Any]) -> None:
-                for one in watchers:
-                    one(info)
-
-            found = list(play.play(env, maker, self.episodes, self.seed, seconds=self.seconds, watch=watch))
-        paths = [path for path in (self.record, self.video, self.picture) if path]
+            found = self._watched(env, maker) if self.live else self._played(env, maker, stack)
         name = plan.env
         if self.json:
             print_json({"env": name, "actions": who, "episodes": found, "written": [str(path) for path in paths]})
@@ -94,6 +93,28 @@ class Play:
         console = Console()
         console.print(_table(f"{name}, {who}", found))
         print_written(console, *paths)
+
+    def _played(self, env: "SandEnv", maker: "Maker", stack: contextlib.ExitStack) -> list[dict[str, float]]:
+        """What the episodes came to, shown in the files that were asked for."""
+        from rftsim_envs.training import play
+
+        watchers = self._watchers(env, stack)
+
+        def watch(info: Mapping[str, Any]) -> None:
+            for one in watchers:
+                one(info)
+
+        return list(play.play(env, maker, self.episodes, self.seed, seconds=self.seconds, watch=watch))
+
+    def _watched(self, env: "SandEnv", maker: "Maker") -> list[dict[str, float]]:
+        """What the episodes came to that were watched live, the one that the window's closing cut too."""
+        from rftsim_envs.training.live import LiveEpisodes
+
+        live = LiveEpisodes(env, maker, self.seed)
+        print_keys(Console(stderr=True))
+        watch(live, self.seconds)
+        live.restart()
+        return live.ended
 
     def _maker(self, who: str, folder: "Folder") -> "Maker":
         """Whoever chooses the actions, by the word for it."""

@@ -60,7 +60,7 @@ class Train:
     watch: Number = None
     """Record an episode for Rerun each so many seconds, and at the end, to OUT/watch."""
     seeds: Names = None
-    """Several runs, 0,1,2: each in OUT/seed-N."""
+    """Several runs, 0,1,2: each in OUT/seed-N, and OUT/returns.png over all of them."""
     vary: Settings = ()
     """Several runs, in OUT/key=value/seed-N: settings with each value, ground=sand ground=rigid."""
     ray: Text = None
@@ -82,7 +82,8 @@ class Train:
         changes |= {"steps": self.steps} if self.steps is not None else {}
         changes |= {"n_envs": self.envs} if self.envs is not None else {}
         given = read_settings(self.set)
-        if self.seeds is None and not self.vary and self.ray is None:
+        alone = self.seeds is None and not self.vary and self.ray is None
+        if alone:
             plans = {"": make_plan(self.env, given, changes, seed=self.seed, algo=self.algo)}
         else:
             seeds = _seeds(self.seeds or str(self.seed))
@@ -93,6 +94,12 @@ class Train:
         else:
             for name, one in found.items():
                 print_line(Console(), _said(*one, self.out / name))
+        if not alone:
+            from rftsim_envs.tasks import title
+
+            from rftsim.cli.sweep import show_sweep
+
+            show_sweep(title(next(iter(plans.values())).task), self.out, found, self.json)
         if not all(one.done for one in found.values()):
             sys.exit(130)
 

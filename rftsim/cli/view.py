@@ -12,7 +12,7 @@ from rftsim.cli.output import print_line
 from rftsim.cli.scene import Scene
 from rftsim.errors import RftsimError
 from rftsim.run.start import begin
-from rftsim.view.live import KEYS, watch
+from rftsim.view.live import KEYS, Live, watch
 
 
 @dataclasses.dataclass(frozen=True)
@@ -34,7 +34,11 @@ class View(Scene):
         if self.seconds is not None and not 0.0 < self.seconds < math.inf:
             raise RftsimError(f"seconds must be positive, not {self.seconds:g}")
         staged = self.staged(settle=self.settle, timestep=self.timestep)
-        console = Console()
-        for key, does in KEYS:
-            print_line(console, f"{key}: {does}")
-        watch(staged.model, functools.partial(begin, staged), self.seconds)
+        print_keys(Console())
+        watch(Live(staged.model, functools.partial(begin, staged)), self.seconds)
+
+
+def print_keys(console: Console) -> None:
+    """Say what the keys do in a live view, each on a line of its own."""
+    for key, does in KEYS:
+        print_line(console, f"{key}: {does}")

@@ -76,14 +76,19 @@ class Handle(Protocol):
 class Live:
     """A simulation that follows a clock, and what keys do to it.
 
+    Those that inherit step and begin in their own way, as a policy's episodes do.
+
     Args:
         model: Compiled, with sand; its sand is what the keys change, and how that is drawn.
         begin: Makes the data of the start.
+
+    Attributes:
+        tick: Simulated time of a `step` [s].
     """
 
     def __init__(self, model: mujoco.MjModel, begin: Callable[[], mujoco.MjData]) -> None:
         self.model, self.start = model, begin()
-        self.data = begin()
+        self.data, self.tick = begin(), float(model.opt.timestep)
         self.shown = Shown()
         self.paused = False
         self.strength = 1.0
@@ -108,11 +113,27 @@ class Live:
         if self.paused:
             mujoco.mj_forward(self.model, self.data)
             return
-        self._owed = min(self._owed + span, LONGEST)
-        steps = int(self._owed / self.model.opt.timestep)
-        self._owed -= steps * self.model.opt.timestep
+        self._owed = min(self._owed + span, max(LONGEST, self.tick))
+        steps = int(self._owed / self.tick)
+        self._owed -= steps * self.tick
         for _ in range(steps):
-            mujoco.mj_step(self.model, self.data)
+            self.step()
+
+    def step(self) -> None:
+        """Let the simulation go on by a tick."""
+        mujoco.mj_step(self.model, self.data)
+
+    def restart(self) -> None:
+        """Go back to the start, in the same data, which the viewer holds."""
+        kept = mujoco.mjtState.mjSTATE_INTEGRATION
+        state = np.empty(mujoco.mj_stateSize(self.model, kept))
+        mujoco.mj_getState(self.model, self.start, state, kept)
+        mujoco.mj_setState(self.model, self.data, state, kept)
+        mujoco.mj_forward(self.model, self.data)
+
+    def aim(self) -> mujoco.MjvCamera:
+        """A camera that shows everything that can move, as the window's begins."""
+        return framing(self.model, self.data)
 
     def draw(self, scene: mujoco.MjvScene) -> None:
         """Fill the viewer's own scene with what the sand does."""
@@ -132,6 +153,11 @@ class Live:
 
     def texts(self) -> tuple[str, str]:
         """Two columns of text: the time, the sand, and the keys."""
+        names, values = zip(*self.state(), *KEYS, strict=True)
+        return "\n".join(names), "\n".join(values)
+
+    def state(self) -> list[tuple[str, str]]:
+        """Names and values of the time, and of what the sand does."""
         weight = moving_weight(self.model)
         lift = against_gravity(self.model, total_force(self.model, self.data))
         carried = f"{100.0 * lift / weight:.0f} % of {weight:.4g} N" if weight > 0.0 else f"{lift:.4g} N"
@@ -142,17 +168,18 @@ class Live:
         ]
         if self.shown.tractions:
             state.append(("traction, 0 to", said(self._drawing.largest)))
-        names, values = zip(*state, *KEYS, strict=True)
-        return "\n".join(names), "\n".join(values)
+        return state
 
     def _obey(self, key: int) -> None:
         shown = self.shown
         if key == SPACE:
             self.paused = not self.paused
         elif key == BACKSPACE:
-            self._restart()
+            self.restart()
         elif key in (UP, DOWN):
-            self._strengthen(FACTOR if key == UP else 1.0 / FACTOR)
+            factor = FACTOR if key == UP else 1.0 / FACTOR
+            self.strength *= factor
+            self.strengthen(factor)
         elif key == ord("6"):
             self.shown = shown._replace(forces=not shown.forces)
         elif key == ord("7"):
@@ -165,34 +192,23 @@ class Live:
         """Give the drawn sand its opacity."""
         self.model.geom_rgba[list(sand_geoms(self.model)), 3] = OPACITIES[self._opacity]
 
-    def _restart(self) -> None:
-        """Go back to the start, in the same data, which the viewer holds."""
-        kept = mujoco.mjtState.mjSTATE_INTEGRATION
-        state = np.empty(mujoco.mj_stateSize(self.model, kept))
-        mujoco.mj_getState(self.model, self.start, state, kept)
-        mujoco.mj_setState(self.model, self.data, state, kept)
-        mujoco.mj_forward(self.model, self.data)
-
-    def _strengthen(self, factor: float) -> None:
+    def strengthen(self, factor: float) -> None:
         """Multiply the strength of all sand by a factor."""
-        self.strength *= factor
         for one in instances(self.model):
             one.bed.xi_n *= factor
             one.bed.zeta *= factor
 
 
-def watch(model: mujoco.MjModel, begin: Callable[[], mujoco.MjData], seconds: float | None = None) -> None:
-    """Show a model live, until its window is closed.
+def watch(live: Live, seconds: float | None = None) -> None:
+    """Show a simulation live, until its window is closed.
 
     Args:
-        model: Compiled, with sand; its sand is what the keys change.
-        begin: Makes the data of the start.
+        live: The simulation.
         seconds: Time after which it closes by itself [s].
 
     Raises:
         RftsimError: There is no display to show it on.
     """
-    live = Live(model, begin)
     with _window(live) as handle:
         follow(live, handle, seconds)
 
@@ -230,7 +246,8 @@ def _window(live: Live) -> Iterator[Handle]:
         raise RftsimError(f"the viewer does not open: {error}") from error
     try:
         with handle.lock():
-            camera = framing(live.model, live.data)
+            camera = live.aim()
+            handle.cam.type, handle.cam.trackbodyid = camera.type, camera.trackbodyid
             handle.cam.lookat[:], handle.cam.distance = camera.lookat, camera.distance
             handle.cam.azimuth, handle.cam.elevation = camera.azimuth, camera.elevation
         yield handle

@@ -2,11 +2,7 @@
 
 import contextlib
 import functools
-import os
-import select
-import shutil
 import subprocess
-import sys
 
 import mujoco
 import numpy as np
@@ -143,31 +139,11 @@ def test_without_a_display(capsys, path, monkeypatch):
     assert "seconds must be positive" in err
 
 
-@pytest.fixture
-def display():
-    """The name of a virtual display."""
-    if shutil.which("Xvfb") is None:
-        pytest.skip("there is no Xvfb, a virtual display, on this machine")
-    reading, writing = os.pipe()
-    screen = ("-screen", "0", "640x480x24", "-displayfd", str(writing))
-    server = subprocess.Popen(["Xvfb", *screen], pass_fds=[writing], stderr=subprocess.DEVNULL)
-    os.close(writing)
-    try:
-        assert select.select([reading], [], [], 30.0)[0], "Xvfb starts"
-        yield f":{os.read(reading, 16).decode().strip()}"
-    finally:
-        os.close(reading)
-        server.terminate()
-        server.wait()
-
-
 def test_a_window_opens_and_closes(display, path):
     """The command in a process of its own ends by itself, and well."""
-    kept = {name: value for name, value in os.environ.items() if name not in ("MUJOCO_GL", "WAYLAND_DISPLAY")}
-    command = [sys.executable, "-c", "from rftsim.cli import main; main()", "view", str(path), "--seconds", "0.5"]
     ended = subprocess.run(
-        command,
-        env=kept | {"DISPLAY": display, "LIBGL_ALWAYS_SOFTWARE": "1"},
+        display.command("view", path, "--seconds", 0.5),
+        env=display.environment(),
         capture_output=True,
         text=True,
         timeout=120,

@@ -1,5 +1,6 @@
 """Wheel, rover and quadruped as tasks: at rest without action, and what their rewards ask for, a controller can do."""
 
+import mujoco
 import numpy as np
 import pytest
 from rftsim_envs import ConfigError, SandEnv, SandVectorEnv
@@ -9,8 +10,9 @@ from rftsim_envs.quadruped import Quadruped
 from rftsim_envs.rover import BURIED, Rover, digging, progress
 from rftsim_envs.rover import RADIUS as ROVER_RADIUS
 from rftsim_envs.walking import closeness
+from rftsim_models.rover import build_rover
 
-from rftsim import wrenches
+from rftsim import add_sand, wrenches
 from rftsim.run.run import run as simulate
 from rftsim.run.scenes import stage
 
@@ -89,10 +91,55 @@ def test_rover_stays_where_it_is(ground, slope):
 
 def test_rover_that_only_spins_its_wheels_digs_in():
     """In loose poppy seeds opposite rates bury the wheels: failed, and worth less than nothing."""
-    env = SandVectorEnv("Rover", 1, sand="poppy-seeds", slope_deg=0.0)
+    env = SandVectorEnv("Rover", 1, sand="poppy-seeds", slope_deg=0.0, guard=0.0)
     total, info = run(env, lambda _: np.array([[1.0, -1.0]]), 40)
     assert total[0] < 0.0
     assert info["sinkage"][0] > (1.0 - BURIED) * ROVER_RADIUS
+
+
+def pull(sand, slip, speed=0.1):
+    """Force with which the rover pulls at what holds it to a speed, its wheels at a slip, over its weight [-]."""
+    spec = build_rover()
+    spec.option.timestep = 0.005
+    add_sand(spec, sand, "rft3d", bodies=Rover.felt, max_edge=Rover.edge, tolerance=0.01)
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    data.ctrl[:] = speed / (1.0 - slip) / ROVER_RADIUS
+    holds, seconds = [], 3.0
+    while data.time < seconds:
+        data.xfrc_applied[1, 0] = 3000.0 * (speed - data.qvel[0])
+        mujoco.mj_step(model, data)
+        holds.append(data.xfrc_applied[1, 0])
+    return -np.mean(holds[len(holds) // 2 :]) / (9.81 * model.body_mass.sum())
+
+
+@pytest.mark.parametrize(("sand", "crosses"), [("medium-sand", True), ("poppy-seeds", False), ("glass-beads", False)])
+def test_no_slip_lets_the_rover_cross_loose_sand(sand, crosses):
+    """Its wheels sink by half their radius there, and hold it up by more than they thrust, whatever their rate."""
+    assert (max(pull(sand, slip) for slip in (0.1, 0.2, 0.3, 0.5)) > 0.0) == crosses
+
+
+def test_a_rover_that_digs_in_pays_for_it():
+    """The price once, in the step in which it fails, where a rover that stands still pays nothing."""
+    env = SandEnv("Rover", sand="poppy-seeds", slope_deg=0.0, failure=7.0, guard=0.0)
+    env.reset(seed=0)
+    ended, paid = False, []
+    while not ended:
+        _, _, ended, _, info = env.step(np.array([1.0, 1.0]))
+        paid.append(info["reward/failure"])
+    assert paid[-1] == pytest.approx(-7.0)
+    assert not any(paid[:-1])
+
+
+@pytest.mark.parametrize("action", [(1.0, 1.0), (1.0, -1.0), (-1.0, 0.3)])
+def test_a_guarded_rover_does_not_bury_itself(action):
+    """On poppy seeds and on sand weaker still the drives let go before a wheel is dug in, whatever is asked."""
+    env = SandVectorEnv("Rover", 2, sand="poppy-seeds", strength=(0.8, 1.0), slope_deg=0.0, duration=4.0)
+    total, info = run(env, lambda _: np.tile(action, (2, 1)), 80)
+    assert (info["sinkage"] < (1.0 - BURIED) * ROVER_RADIUS).all()
+    assert (info["sinkage"] > 0.6 * ROVER_RADIUS).all(), "they have sunk as far as the guard lets them"
+    assert (total > -2.0).all()
 
 
 def test_rovers_passing_speed():

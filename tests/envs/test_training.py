@@ -25,6 +25,7 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import DummyVecEnv
 
 import rftsim
+from rftsim.cli import evaluate as results
 from rftsim.cli import main
 from rftsim.cli.train import interruptible
 
@@ -108,6 +109,18 @@ def test_a_seed_gives_one_policy(finished, tmp_path):
     ppo.train(make_plan(TASK, SHORT, TINY, seed=1), tmp_path / "other")
     assert equal(parameters(finished / "policy.zip"), parameters(tmp_path / "again" / "policy.zip"))
     assert not equal(parameters(finished / "policy.zip"), parameters(tmp_path / "other" / "policy.zip"))
+
+
+def test_a_run_starts_with_the_policy_of_another(finished, tmp_path):
+    """The network is that one until the first update, which learns nothing at a rate that is all but zero."""
+    still = TINY | {"steps": 124, "learning_rate": 1e-30, "start": str(finished)}
+    ppo.train(make_plan(TASK, SHORT | {"strength": (0.5, 2.0)}, still), tmp_path / "next")
+    before, after = parameters(finished / "policy.zip"), parameters(tmp_path / "next" / "policy.zip")
+    assert all(np.allclose(before[name], after[name], rtol=0.0, atol=1e-12) for name in before)
+    for start, words in ((tmp_path / "none", "has no policy yet"), (finished, "cannot take over the policy")):
+        with pytest.raises(TrainingError, match=words):
+            ppo.train(make_plan(TASK, SHORT, TINY | {"layers": (9,), "start": str(start)}), tmp_path / "other")
+    assert not (tmp_path / "other").exists()
 
 
 def test_a_stopped_run_goes_on_from_its_last_update(tmp_path):
@@ -362,6 +375,16 @@ def test_a_policy_is_scored_on_grounds(finished, tmp_path, capsys):
     for one in report[str(finished)]:
         assert one["ended_early"] == 0.0
         assert one["which"].endswith("rad/s") == (one["actor"] == "open loop")
+
+
+def test_the_share_that_arrives_is_told_where_any_does():
+    one = {"r": 1.0, "early": 0.0, "reached": 1.0}
+    for episodes, told in (
+        ([one, one | {"reached": 0.0}], ["arrived [%]", "50"]),
+        ([one | {"reached": 0.0}], ["early [%]", "0"]),
+    ):
+        head, row = results._grid([evaluate.Score("sand", evaluate.POLICY, episodes)], False)
+        assert [head[-1], row[-1]] == told
 
 
 def test_several_runs_make_a_table_of_transfer(finished, tmp_path, capsys):

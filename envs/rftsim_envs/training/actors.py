@@ -7,14 +7,14 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from stable_baselines3.common.policies import ActorCriticPolicy
-from stable_baselines3.common.save_util import load_from_zip_file
 from stable_baselines3.common.utils import ConstantSchedule
 
 from rftsim_envs.env import spaces
 from rftsim_envs.episodes import Episodes, Observation
-from rftsim_envs.recipe import Drive, TrainingError
+from rftsim_envs.recipe import Drive
 from rftsim_envs.training.folder import Folder
 from rftsim_envs.training.network import network
+from rftsim_envs.training.weights import read_policy, take_over
 
 Actor = Callable[[Observation, float], NDArray[Any]]
 """Actions (n, naction) as a function of what is seen, (n, nobservation), and the time since the start [s]."""
@@ -24,18 +24,11 @@ Maker = Callable[[Episodes], Actor]
 
 def trained(folder: Folder) -> Maker:
     """A maker of actors by the policy of a run, without its noise; that of the checkpoint where it is not finished."""
-    path = folder.policy if folder.policy.is_file() else folder.checkpoint
-    if not path.is_file():
-        raise TrainingError(f"{folder.path} has no policy yet: neither {folder.policy.name} nor {path.name} is there")
-    training = folder.plan().training
+    training, parameters = folder.plan().training, read_policy(folder)
 
     def make(episodes: Episodes) -> Actor:
         policy = ActorCriticPolicy(*spaces(episodes), ConstantSchedule(0.0), **network(training))
-        try:
-            _, parameters, _ = load_from_zip_file(str(path), device="cpu", load_data=False)
-            policy.load_state_dict(dict(parameters["policy"]))
-        except (OSError, ValueError, KeyError, RuntimeError) as error:
-            raise TrainingError(f"cannot take a policy from {path}: {error}") from error
+        take_over(policy, parameters, folder)
         policy.set_training_mode(False)
 
         def act(seen: Observation, time: float) -> NDArray[Any]:

@@ -22,6 +22,7 @@ from rftsim_envs.recipe import Training, TrainingError
 from rftsim_envs.sb3 import SandVecEnv
 from rftsim_envs.training.folder import Folder, Plan, Progress, write_whole
 from rftsim_envs.training.network import Normalising, network
+from rftsim_envs.training.weights import read_policy, take_over
 
 EVERY_SECONDS: Final = 5.0
 """Time after which an update is followed by a checkpoint [s]."""
@@ -83,6 +84,9 @@ def train(
         return Trained(total, total, True)
     env = SandVecEnv(plan.task, plan.training.n_envs, threads, **plan.settings)
     model = make_model(plan.training, env, plan.seed)  # what cannot be is refused before anything is written
+    if plan.training.start and not folder.checkpoint.is_file():
+        before = Folder(plan.training.start)
+        take_over(model.policy, read_policy(before), before)
     with folder.opened(plan):
         run = _Run(plan, env, model, folder, tensorboard)
         began = run.resume()
