@@ -19,7 +19,7 @@ from pathlib import Path
 FOLDER = Path(__file__).parent / "tables"
 COLUMNS = "100"
 """Width that the commands print for."""
-STUDIES = ("wheel", "runner", "plates", "measured", "scaling", "drill", "continuum", "motion", "slope", "ruts")
+STUDIES = ("wheel", "runner", "plates", "measured", "scaling", "drill", "continuum", "motion", "held", "slope", "ruts")
 CHEAP = {
     "help-rftsim.txt": "rftsim --help",
     "help-run.txt": "rftsim run --help",

@@ -21,7 +21,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from rftsim_mpm import blade, footprint, plate, push, rut, slope, wheel
+from rftsim_mpm import blade, footprint, plate, push, rut, slope, testbed, wheel
 from rftsim_mpm.blade import Blade
 from rftsim_mpm.errors import MpmError
 from rftsim_mpm.footprint import Footprint
@@ -31,9 +31,10 @@ from rftsim_mpm.push import Push
 from rftsim_mpm.rut import Rut
 from rftsim_mpm.simulation import Watch
 from rftsim_mpm.slope import Slope
+from rftsim_mpm.testbed import HeldWheel
 from rftsim_mpm.wheel import Wheel
 
-Job = Plate | Push | Wheel | Slope | Footprint | Blade | Rut
+Job = Plate | Push | Wheel | Slope | Footprint | Blade | Rut | HeldWheel
 KINDS: dict[str, type[Job]] = {
     "plates": Plate,
     "pushes": Push,
@@ -42,6 +43,7 @@ KINDS: dict[str, type[Job]] = {
     "footprints": Footprint,
     "blades": Blade,
     "ruts": Rut,
+    "held": HeldWheel,
 }
 """The kinds of jobs by their names in files."""
 MEASURES: dict[type[Job], Callable[[Any, Watch | None], Any]] = {
@@ -52,13 +54,14 @@ MEASURES: dict[type[Job], Callable[[Any, Watch | None], Any]] = {
     Footprint: footprint.press,
     Blade: blade.plow,
     Rut: rut.follow_rut,
+    HeldWheel: testbed.hold,
 }
 """What measures each kind of job; its outcome has a `report` and a `series`."""
 
 MOST_JOBS = 100_000
 """Most jobs of one file."""
 DATA = Path(__file__).parent / "data"
-"""Campaigns that are shipped: `plates`, `flat`, `solids`, `deep`, `rates`, `wheels`, `slopes` and `ruts`."""
+"""Campaigns that are shipped: `plates`, `flat`, `solids`, `deep`, `rates`, `wheels`, `slopes`, `ruts` and `held`."""
 
 
 class Status(NamedTuple):

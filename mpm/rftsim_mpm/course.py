@@ -55,6 +55,8 @@ class Course:
     """Particles per cell along each axis."""
     xpic: int = 0
     """Order of XPIC; 0 is FLIP."""
+    calm: float = 0.0
+    """As in `Simulation` [s]."""
     shift: tuple[float, ...] = (0.0, 0.0)
     """Place of the body on the grid, along each horizontal axis [cells]."""
     gravity: Array | float = 9.81
@@ -99,8 +101,8 @@ class Course:
             raise MpmError(f"the way takes more than {MOST_STEPS:g} time steps of {dt:.3g} s: go faster, or less far")
         box = (*(n * dx for n in width), top)
         sim = Simulation(
-            self.material, bed, dx, box, bodies=[body], dt=dt, xpic=self.xpic, gravity=self.gravity,
-            wall_friction=self.wall_friction,
+            self.material, bed, dx, box, bodies=[body], dt=dt, xpic=self.xpic, calm=self.calm,
+            gravity=self.gravity, wall_friction=self.wall_friction,
         )  # fmt: skip
         sim.clear_bodies()
         return sim

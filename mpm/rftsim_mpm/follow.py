@@ -39,13 +39,16 @@ class Track(NamedTuple):
     """Velocity of each body, (n, nbody, dim) [m/s]."""
     force: Array
     """Force of the sand on each body, (n, nbody, dim) [N, in the plane N/m]."""
+    moment: Array
+    """Moment of the sand about each body's origin, (n, nbody, 1 or 3) [N m, in the plane N]."""
     frames: list[Frame]
     """Frames at the times asked for, and at the end."""
 
     def after(self, time: float) -> "Track":
         """Return the part of the track from a time [s] on, with all frames."""
         keep = self.time >= time
-        return Track(self.time[keep], self.position[keep], self.velocity[keep], self.force[keep], self.frames)
+        averages = ("time", "position", "velocity", "force", "moment")
+        return self._replace(**{name: getattr(self, name)[keep] for name in averages})
 
 
 def follow(sim: Simulation, duration: float, watch: Watch | None = None, shots: Sequence[float] = ()) -> Track:
@@ -68,7 +71,7 @@ def follow(sim: Simulation, duration: float, watch: Watch | None = None, shots: 
     while sim.time < duration:
         sim.step()
         moved = [part for body in sim.bodies for part in (body.position, body.velocity)]
-        pending.append(np.concatenate([sim.force.ravel(), *moved]))
+        pending.append(np.concatenate([sim.force.ravel(), sim.moment.ravel(), *moved]))
         if sim.time >= until:
             rows.append(np.concatenate([[sim.time], np.mean(pending, axis=0)]))
             pending.clear()
@@ -84,6 +87,8 @@ def follow(sim: Simulation, duration: float, watch: Watch | None = None, shots: 
             watch(sim, min(1.0, sim.time / duration))
     bodies, dim = len(sim.bodies), sim.particles.dim
     table = np.array(rows).reshape(len(rows), -1)
-    ends = np.split(table[:, 1:], [bodies * dim], axis=1)
-    placed = ends[1].reshape(len(rows), bodies, 2, dim)
-    return Track(table[:, 0], placed[:, :, 0], placed[:, :, 1], ends[0].reshape(len(rows), bodies, dim), frames)
+    forces, moments, ways = np.split(table[:, 1:], np.cumsum([sim.force.size, sim.moment.size]), axis=1)
+    placed, shape = ways.reshape(len(rows), bodies, 2, dim), (len(rows), bodies, -1)
+    return Track(
+        table[:, 0], placed[:, :, 0], placed[:, :, 1], forces.reshape(shape), moments.reshape(shape), frames
+    )  # fmt: skip

@@ -3,7 +3,7 @@
 import copy
 import dataclasses
 import math
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,7 +45,7 @@ class Rut(Wheel):
         return 2.0 * (self.time + self.rest)
 
     @property
-    def quick(self) -> "Rut":
+    def quick(self) -> Self:
         """The same with coarser cells, and hardly further than is compared: a look, not a measurement."""
         return dataclasses.replace(self, dx=self.width / 1.06, duration=48.0 / abs(self.rpm) * 0.75, rest=0.1)
 

@@ -37,7 +37,7 @@ SORT_EVERY = 80
 """Steps between sorting the particles by cell."""
 CALM_EVERY = 20
 """Steps between takings of what the grid does not see from the velocities."""
-CALM_ORDER = 4
+CALM_ORDER = 6
 """Order of XPIC that tells what the grid does not see."""
 
 

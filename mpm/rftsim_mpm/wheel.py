@@ -2,7 +2,7 @@
 
 import dataclasses
 import math
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,10 +13,13 @@ from rftsim_mpm.errors import MpmError, check_positive
 from rftsim_mpm.follow import Track, follow
 from rftsim_mpm.material import Material, stiffness
 from rftsim_mpm.reading import thinned
-from rftsim_mpm.shapes import wheel
+from rftsim_mpm.shapes import Shape, disc, wheel
 from rftsim_mpm.simulation import Simulation, Watch
 
 Array = NDArray[np.float64]
+
+SIDES = 120
+"""Sides of a wheel without grousers."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -24,19 +27,19 @@ class Wheel:
     """The wheel of Table 4.1 on the poppy seeds of Table 4.2, in plane strain."""
 
     rpm: float = 30.0
-    """Spin; positive rolls towards +x [1/min]."""
+    """Spin; above 0 it rolls to +x [1/min]."""
     duration: float | None = None
     """Simulated time [s]; by default one second and half a turn."""
     entry: float = 0.8
-    """Forward speed at the start, over omega r, r with grousers [-]."""
+    """Speed at the start over omega r [-]."""
     radius: float = 0.094
     """Radius without grousers [m]."""
     grousers: int = 20
-    """How many grousers the wheel has."""
+    """How many grousers; with 0 it is a disc."""
     height: float = 0.012
     """Height of a grouser [m]."""
     width: float = 0.006
-    """Width of a grouser, along the rim [m]."""
+    """Width of one along the rim [m]."""
     breadth: float = 0.14
     """Breadth, by which masses and forces are divided [m]."""
     mass_x: float = 23.0
@@ -64,22 +67,24 @@ class Wheel:
         check_positive(
             self, "duration", "radius", "height", "width", "breadth", "mass_x", "mass_z", "mu_int", "rho", "dx"
         )
-        if not 2 <= self.grousers <= 1000 or self.grousers * self.width >= 2.0 * math.pi * self.radius:
-            raise MpmError(f"{self.grousers} grousers of {self.width:g} m do not fit on the wheel; 2 to 1000 may")
+        if not 2 <= (self.grousers or 2) <= 1000 or self.grousers * self.width >= 2.0 * math.pi * self.radius:
+            raise MpmError(
+                f"{self.grousers} grousers of {self.width:g} m do not fit on the wheel; none, or 2 to 1000, may"
+            )
         if self.xpic < 0:
             raise MpmError(f"xpic must be zero or more, not {self.xpic}")
-        if self.width < 1.06 * self.dx:
+        if self.grousers and self.width < 1.06 * self.dx:
             raise MpmError(f"grousers {self.width:g} m wide are too thin for cells of {self.dx:g} m: use smaller ones")
 
     @property
-    def quick(self) -> "Wheel":
+    def quick(self) -> Self:
         """The same with coarser cells, and shorter: a look, not a measurement."""
         return dataclasses.replace(self, dx=min(1.25 * self.dx, self.width / 1.06), duration=min(self.time, 0.5))
 
     @property
     def outer(self) -> float:
-        """Radius of the wheel with its grousers [m]."""
-        return self.radius + self.height
+        """Radius of the wheel with its grousers, if it has any [m]."""
+        return self.radius + (self.height if self.grousers else 0.0)
 
     @property
     def time(self) -> float:
@@ -150,7 +155,7 @@ def prepare(study: Wheel) -> Simulation:
     material = Material.of_density(study.mu_int, study.rho, young)
     weight = study.mass_z * study.gravity
     body = Body(
-        wheel(study.radius, study.grousers, study.height, study.width),
+        outline(study),
         np.array([before if omega >= 0.0 else length - before, depth + outer - 0.5 * study.height]),
         np.array([study.entry * omega * outer, 0.0]),
         study.mu_surf,
@@ -175,6 +180,13 @@ def prepare(study: Wheel) -> Simulation:
 def omega_of(study: Wheel) -> float:
     """Return the spin of the wheel [rad/s]."""
     return study.rpm * 2.0 * math.pi / 60.0
+
+
+def outline(study: Wheel) -> Shape:
+    """Return the wheel's outline, about its axle."""
+    if not study.grousers:
+        return disc(study.radius, SIDES)
+    return wheel(study.radius, study.grousers, study.height, study.width)
 
 
 def bed_depth(study: Wheel) -> float:

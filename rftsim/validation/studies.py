@@ -11,7 +11,7 @@ import rftsim_models
 import rftsim
 from rftsim.errors import RftsimError
 from rftsim.files import Kept
-from rftsim.validation import continuum, drill, measured, motion, plates, runner, ruts, scaling, slopes, wheel
+from rftsim.validation import continuum, drill, held, measured, motion, plates, runner, ruts, scaling, slopes, wheel
 from rftsim.validation.study import Measured, Request, Row, Study
 
 
@@ -31,6 +31,7 @@ STUDIES: Final = {
     "motion": _study(
         "dynamic laws against plates at speed and wheels of the material point method", motion, (15.0, 4.8)
     ),
+    "held": _study("a wheel held at slip and sinkage by the material point method", held, (15.0, 4.8)),
     "slope": _study("depth and up on slopes, against plates of the material point method", slopes, (15.0, 4.8)),
     "ruts": _study("prints, heaps and ruts against the material point method", ruts, (13.0, 9.0)),
 }

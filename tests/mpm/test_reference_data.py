@@ -1,9 +1,12 @@
 """The plates that are shipped: whole, symmetric, dissipative; and where the source's Table C.1 comes from."""
 
+import math
+
 import numpy as np
 import pytest
 from rftsim_mpm.campaign import DATA, results, status
 from rftsim_mpm.reading import limit
+from slip_lines import bearing_pressure
 
 ALPHA_Z = 0.87574
 """alpha_z of a flat plate pushed down, over xi_n, by Table C.3."""
@@ -16,7 +19,7 @@ def plates():
     return results(DATA / "plates")
 
 
-@pytest.mark.parametrize("name", ["plates", "flat", "deep", "rates", "wheels", "solids", "slopes", "ruts"])
+@pytest.mark.parametrize("name", ["plates", "flat", "deep", "rates", "wheels", "solids", "slopes", "ruts", "held"])
 def test_they_are_whole(name):
     """Everything that was asked for is there, as it was written."""
     found = status(DATA / name)
@@ -47,6 +50,40 @@ def test_forces_grow_with_friction(plates):
     assert (np.diff(alpha / mu) > 0.0).all()
 
 
+def over_slip_lines(plate, alpha_z):
+    """Pressure on a square plate over that on the smooth circle of its area, by slip lines with tan(phi) = mu [-]."""
+    depth = plate["depth"] / plate["length"] * math.sqrt(math.pi) / 2.0  # in diameters
+    return alpha_z / (plate["rho"] * 9.81) / (bearing_pressure(math.atan(plate["mu_int"]), depth) / depth)
+
+
+def test_slip_lines_bear_what_is_published():
+    """N_gamma of a smooth circle at 30 degrees is 7.10 [Martin2005]; on loads alone p grows with them (no gravity)."""
+    assert 2.0 * bearing_pressure(math.radians(30.0), 1e-4, lines=48) == pytest.approx(7.10, rel=0.03)
+    deep, deeper = (bearing_pressure(math.radians(30.0), depth) / depth for depth in (1e4, 2e4))
+    assert deeper == pytest.approx(deep, rel=1e-3)
+
+
+def test_flat_plates_bear_a_steady_share_of_their_slip_lines(plates):
+    """Over mu 0.2 to 0.7, where the pressure grows 23-fold: constant within 10 %, between 1.1 and 1.45.
+
+    A square bears more than a circle, its sides are rough, and the sand rises beside it. Table C.1 would be 1.9 to 2.3.
+    """
+    flat = [f for f in plates if f["plate"]["beta"] == 0.0 and f["plate"]["gamma"] == 90.0]
+    ratios = np.array([over_slip_lines(f["plate"], f["alpha_N_m3"][2]) for f in flat])
+    assert len({f["plate"]["mu_int"] for f in flat}) == 6
+    assert ratios.max() / ratios.min() < 1.1
+    assert 1.1 < ratios.min() < ratios.max() < 1.45
+
+
+@pytest.mark.parametrize("cells", [7.0, 10.0])
+def test_the_share_is_steady_at_other_cells(cells):
+    own = [f for f in results(DATA / "flat") if (f["plate"]["early"], f["plate"]["cells"]) == (0.0, cells)]
+    ratios = np.array([over_slip_lines(f["plate"], f["alpha_N_m3"][2]) for f in own])
+    assert len(ratios) == 3
+    assert ratios.max() / ratios.min() < 1.1
+    assert 1.1 < ratios.min() < ratios.max() < 1.45
+
+
 def flat_plates():
     return {
         (f["plate"]["mu_int"], f["plate"]["early"], f["plate"]["cells"]): f["alpha_N_m3"][2]
@@ -75,3 +112,29 @@ def test_the_limit_is_below_table_c1(mu, share):
     found = flat_plates()
     alpha = float(limit(found[mu, 0.0, 7.0], found[mu, 0.0, 10.0], 10.0 / 7.0))
     assert alpha / (ALPHA_Z * TABLE_C1[mu]) == pytest.approx(share, abs=0.002)
+
+
+def held(grousers, mu, dx, shift=0.0):
+    """Load [N/m] and torque [N] of a shipped wheel at slip 0.3."""
+    wanted = {"grousers": grousers, "mu_int": mu, "dx": pytest.approx(dx), "shift": shift, "prescribed_slip": 0.3}
+    own = [f for f in results(DATA / "held") if all(f["heldwheel"][name] == value for name, value in wanted.items())]
+    assert len(own) == 1
+    return own[0]["load_N_m"], own[0]["torque_N"]
+
+
+def test_a_wheel_in_weak_sand_has_converged():
+    """At mu 0.4, load and torque: at most 5 % from cells of 2 to 1.33 mm, and from half a cell aside."""
+    expected = pytest.approx(held(20, 0.4, 0.002), rel=0.05)
+    assert held(20, 0.4, 0.004 / 3.0) == expected
+    assert held(20, 0.4, 0.002, shift=0.5) == expected
+
+
+@pytest.mark.parametrize(("mu", "least"), [(0.4, 0.85), (0.56, 0.7)])
+def test_a_disc_bears_less_the_finer_its_cells(mu, least):
+    """Without dilatancy there is no exact limit load: finer cells go from the upper limit towards the lower.
+
+    N_q at sin(phi) = mu is 1.20 and 1.75 times that at tan(phi) = mu; the loads stay within such a range.
+    """
+    loads = [held(0, mu, dx)[0] for dx in (0.004, 0.002, 0.004 / 3.0)]
+    assert loads == sorted(loads, reverse=True)
+    assert loads[-1] > least * loads[0]

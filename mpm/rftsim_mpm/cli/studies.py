@@ -11,6 +11,7 @@ from rftsim_mpm.collapse import Collapse, Runout, exponent, fall
 from rftsim_mpm.drag import Drag, DragForces, drag
 from rftsim_mpm.follow import part
 from rftsim_mpm.simulation import Watch
+from rftsim_mpm.testbed import Held, HeldWheel, hold
 from rftsim_mpm.wheel import Rolling, Wheel, roll
 
 
@@ -54,24 +55,29 @@ class DragCommand(StudyCommand[Drag, DragForces]):
         plot_drag(found.depth, found.speed, found.drag, fit, path)
 
 
-class WheelCommand(StudyCommand[Wheel, Rolling]):
-    """Let a driven grousered wheel travel and sink.
+class WheelCommand(StudyCommand[HeldWheel, Rolling | Held]):
+    """Let a driven grousered wheel travel and sink, or hold it at a slip and a sinkage and read the forces on it.
 
     Example: rftsim-mpm wheel --rpm 60 --plot wheel.png
     """
 
     title = "wheel"
 
-    def _quicker(self) -> Wheel:
+    def _quicker(self) -> HeldWheel:
         return self.study.quick
 
-    def _run(self, study: Wheel, watch: Watch) -> Rolling:
-        return roll(study, watch)
+    def _run(self, study: HeldWheel, watch: Watch) -> Rolling | Held:
+        return hold(study, watch) if study.held else roll(study, watch)
 
-    def _report(self, study: Wheel, found: Rolling) -> dict[str, Any]:
+    def _report(self, study: HeldWheel, found: Rolling | Held) -> dict[str, Any]:
+        if isinstance(found, Held):
+            return found.report
         return found.report | {"speed_over_sqrt_gl": found.speed / _unit_speed(study)}
 
-    def _lines(self, study: Wheel, found: Rolling) -> list[str]:
+    def _lines(self, study: HeldWheel, found: Rolling | Held) -> list[str]:
+        if isinstance(found, Held):
+            loads = zip(("load", "drawbar", "torque"), found.means, found.noise, ("N/m", "N/m", "N"), strict=True)
+            return [f"{name} {mean:.4g} ± {noise:.2g} {unit}" for name, mean, noise, unit in loads]
         scaled = found.speed / _unit_speed(study)
         return [
             f"{study.rpm:g} RPM: {found.speed:.4f} m/s, {scaled:.3f} sqrt(g l), slip {found.slip:.3f}; "
@@ -79,10 +85,16 @@ class WheelCommand(StudyCommand[Wheel, Rolling]):
             f"sinkage {1e3 * found.sinkage:.1f} mm; behind, the surface is {1e3 * found.drop:.1f} mm lower than ahead",
         ]
 
-    def _draw(self, study: Wheel, found: Rolling, path: Path) -> None:
-        from rftsim_mpm.plots import plot_wheel
+    def _draw(self, study: HeldWheel, found: Rolling | Held, path: Path) -> None:
+        from rftsim_mpm.plots import plot_lines, plot_wheel
 
-        plot_wheel(found.time, found.speeds, found.sinkages, found.track.frames[-1], f"wheel, {study.rpm:g} RPM", path)
+        if isinstance(found, Held):
+            curves = [(name, found.time, found.forces[:, i]) for i, name in enumerate(("load", "drawbar"))]
+            frames = [("", found.frame, field) for field in ("rate", "pressure")]
+            plot_lines(curves, ("time [s]", "force [N/m]"), frames, path)
+        else:
+            frame = found.track.frames[-1]
+            plot_wheel(found.time, found.speeds, found.sinkages, frame, f"wheel, {study.rpm:g} RPM", path)
 
 
 def _unit_speed(study: Wheel) -> float:

@@ -1,0 +1,150 @@
+"""A wheel held at a prescribed slip and sinkage, as in a single-wheel testbed: load, drawbar and torque."""
+
+import dataclasses
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rftsim_mpm.bed import Particles, level_bed
+from rftsim_mpm.body import Body
+from rftsim_mpm.errors import MpmError, check_not_negative
+from rftsim_mpm.fields import Frame
+from rftsim_mpm.follow import follow
+from rftsim_mpm.material import Material, stiffness
+from rftsim_mpm.reading import averaged
+from rftsim_mpm.simulation import Simulation, Watch
+from rftsim_mpm.wheel import Wheel, omega_of, outline
+
+Array = NDArray[np.float64]
+
+TURN = 1.5
+"""Contact lengths by which the rim of a held wheel turns; forces are read in the second half."""
+PITCHES = 20
+"""Pitches of a wheel without grousers: turns of a twentieth are what its noise is told from."""
+
+
+@dataclasses.dataclass(frozen=True)
+class HeldWheel(Wheel):
+    """The wheel of `Wheel`, free, or held at a slip and a sinkage."""
+
+    prescribed_slip: float | None = None
+    """Slip if held, 1 - v / (omega r) [-]."""
+    prescribed_sinkage: float | None = None
+    """Sinkage of its tips if held [m]."""
+    shift: float = 0.0
+    """If held, place on the grid [cells]."""
+    calm: float = 0.01
+    """If held, as in `Simulation` [s]."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_not_negative(self, "calm")
+        if (self.prescribed_slip is None) != (self.prescribed_sinkage is None):
+            raise MpmError("a wheel is held at a slip and a sinkage: prescribe both, or neither")
+        if self.shift not in (0.0, 0.5):
+            raise MpmError(f"shift must be 0 or 0.5 cells, not {self.shift:g}")
+        if not self.held:
+            return
+        slip, sinkage = float(self.prescribed_slip or 0.0), float(self.prescribed_sinkage or 0.0)
+        if not -1.0 <= slip <= 1.0:
+            raise MpmError(f"prescribed_slip must be in [-1, 1], not {slip:g}")
+        if not 0.0 < sinkage <= 0.5 * self.outer:
+            raise MpmError(f"prescribed_sinkage must be in (0, {0.5 * self.outer:g}] m, not {sinkage:g}")
+
+    @property
+    def held(self) -> bool:
+        """Whether slip and sinkage are prescribed."""
+        return self.prescribed_slip is not None
+
+    @property
+    def contact(self) -> float:
+        """Length of the level surface that the outer circle cuts when held [m]."""
+        sunk = float(self.prescribed_sinkage or 0.0)
+        return 2.0 * math.sqrt(2.0 * self.outer * sunk - sunk**2)
+
+    @property
+    def time(self) -> float:
+        """Simulated time, the default filled in; held, that in which the rim turns by TURN contact lengths [s]."""
+        if not self.held or self.duration:
+            return super().time
+        return TURN * self.contact / (abs(omega_of(self)) * self.outer)
+
+
+class Held(NamedTuple):
+    """Forces on a held wheel, means over the second half of the run, and the run itself; per metre of breadth."""
+
+    means: tuple[float, float, float]
+    """Load, upward [N/m]; drawbar, along the way [N/m]; torque against the spin [N]: of the sand on the wheel."""
+    noise: tuple[float, float, float]
+    """Standard errors of these, from the means over single pitches of the grousers."""
+    time: Array
+    """Times of the whole run, (n,) [s]."""
+    forces: Array
+    """Load, drawbar [N/m] and torque [N] at these times, (n, 3)."""
+    frame: Frame
+    """The sand at the end."""
+
+    @property
+    def series(self) -> dict[str, Any]:
+        """The forces over time as files keep them, in means over neighbouring averages."""
+        return averaged(time_s=self.time, forces_N_m=self.forces)
+
+    @property
+    def report(self) -> dict[str, Any]:
+        """The means as JSON has them, by name and unit."""
+        names = "load_N_m", "drawbar_N_m", "torque_N"
+        noises = (f"{name}_noise" for name in names)
+        return dict(zip((*names, *noises), (*self.means, *self.noise), strict=True))
+
+
+def hold(study: HeldWheel, watch: Watch | None = None) -> Held:
+    """Turn and move a held wheel, sunk into a level bed to begin with, and return the forces on it.
+
+    Raises:
+        MpmError: The wheel is free, or the run too short for means.
+    """
+    if not study.held:
+        raise MpmError("a wheel that is held needs prescribed_slip and prescribed_sinkage")
+    pitch = 60.0 / abs(study.rpm) / (study.grousers or PITCHES)
+    count = math.floor(0.5 * study.time / pitch)
+    if count < 2:
+        raise MpmError(f"half of {study.time:g} s must hold two pitches of {pitch:g} s: a longer duration, or more rpm")
+    track = follow(_prepared(study), study.time, watch)
+    way = math.copysign(1.0, study.rpm)
+    forces = np.column_stack([track.force[:, 0, 1], way * track.force[:, 0, 0], -way * track.moment[:, 0, 0]])
+    late = track.time >= study.time - count * pitch
+    parts = np.array([part.mean(axis=0) for part in np.array_split(forces[late], count)])
+    noise = parts.std(axis=0, ddof=1) / math.sqrt(count)
+    return Held(tuple(parts.mean(axis=0).tolist()), tuple(noise.tolist()), track.time, forces, track.frames[-1])
+
+
+def _prepared(study: HeldWheel) -> Simulation:
+    """The bed with the wheel at its sinkage, in the place of the sand that was there."""
+    omega, outer, dx = omega_of(study), study.outer, study.dx
+    speed = (1.0 - float(study.prescribed_slip or 0.0)) * omega * outer
+    behind, ahead = 0.5 * study.contact + 0.4 * outer, 0.5 * study.contact + outer
+    length = math.ceil((behind + ahead + abs(speed) * study.time) / dx) * dx
+    depth = math.ceil((float(study.prescribed_sinkage or 0.0) + 0.5 * outer) / dx) * dx
+    material = Material.of_density(
+        study.mu_int, study.rho, stiffness(study.rho, study.gravity, 0.3 * outer, study.mu_int)
+    )
+    bed = level_bed(material, (length, depth), dx, gravity=study.gravity)
+    level = depth - study.shift * dx
+    _lower(bed, study.shift * dx)
+    start = behind if omega >= 0.0 else length - behind
+    place = np.array([start + study.shift * dx, level + outer - float(study.prescribed_sinkage or 0.0)])
+    body = Body(outline(study), place, np.array([speed, 0.0]), study.mu_surf, spin=np.array([omega]))
+    sim = Simulation(
+        material, bed, dx, (length, level + 3.0 * outer), bodies=[body], gravity=study.gravity,
+        wall_friction=study.mu_int, xpic=study.xpic, calm=study.calm,
+    )  # fmt: skip
+    sim.clear_bodies()
+    return sim
+
+
+def _lower(bed: Particles, by: float) -> None:
+    """Lower a bed by whole layers of particles [m], the lowest of which go."""
+    bed.x[:, 1] -= by
+    bed.select(bed.x[:, 1] > 0.0)

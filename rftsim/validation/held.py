@@ -1,0 +1,148 @@
+"""The laws against a wheel that the continuum holds at a slip and a sinkage: load, drawbar and torque over the slip.
+
+Computes no continuum: reads the campaign `held` of `rftsim_mpm/data`, which says by what command it was made. How far
+that has converged is told beside it, by its cells and its place on the grid.
+"""
+
+import dataclasses
+import functools
+import itertools
+import math
+from collections.abc import Callable, Iterator
+from typing import Any, Final
+
+import numpy as np
+from rftsim_models.wheels import GROUSER_WHEEL
+
+from rftsim.law.rigid import surface_force
+from rftsim.run.scenes import POPPY
+from rftsim.surface.triangles import Wheel
+from rftsim.validation.pockets import Grousers
+from rftsim.validation.shipped import Results, outcome, shipped
+from rftsim.validation.study import Measured, Request, Row, near
+
+LAWS: Final = ("rft2d", "drft2d")
+"""Laws that are compared."""
+SLIPS: Final = (-0.2, 0.0, 0.1, 0.2, 0.3, 0.4, 0.6, 0.8)
+"""Slips of the shipped wheels [-]."""
+SINKAGE: Final = 0.03
+"""Sinkage at which the slip is varied [m]."""
+RATE: Final = math.pi
+"""Angular velocity of the wheels, 30 turns a minute [rad/s]."""
+NOTE: Final = "no exact limit load without dilatancy, and means wander"
+"""What is said of the continuum where it has not converged."""
+PHASES: Final = 8
+"""Phases of the wheel, within the angle between grousers, that the laws are averaged over."""
+FORCES: Final = ("load_N_m", "drawbar_N_m", "torque_N")
+"""What is compared, per metre of breadth, by the names that the continuum gives it."""
+CELL: Final = 0.004
+"""Size of the cells at which the slip is varied [m]."""
+CONVERGED: Final = 0.05
+"""Largest change from one size of cells to the next, or with the place on the grid, that counts as converged [-]."""
+
+
+def jobs(request: Request) -> dict[str, Callable[[], Any]]:
+    """The job that reads what is shipped, and one for each law and slip."""
+    laws = {f"{law}/{slip:g}": functools.partial(_law, law, slip) for law in LAWS for slip in SLIPS}
+    return shipped("held", _read) | laws
+
+
+def _read(results: Results) -> list[dict[str, float]]:
+    kept = ("prescribed_slip", "grousers", "mu_int", "dx", "shift")
+    names = (*FORCES, *(f"{name}_noise" for name in FORCES))
+    return [{n: one["heldwheel"][n] for n in kept} | {n: one[n] for n in names} for one in results]
+
+
+def _law(law: str, slip: float) -> dict[str, float]:
+    """The forces that a law gives on the wheel at a slip, a third of its grousers' height felt."""
+    own = GROUSER_WHEEL
+    wheel = Grousers(own.radius, own.outer_radius, own.width, own.lugs, own.lug_width)
+    surface = wheel.with_height(own.felt_height).surface
+    surface = dataclasses.replace(surface, wheel=Wheel((0, 1, 0), (0, 0, 0), own.outer_radius))
+    total = np.zeros(3)
+    for phase in wheel.pitch * np.arange(PHASES) / PHASES:
+        c, s = math.cos(phase), math.sin(phase)
+        found = surface_force(
+            surface, POPPY, law, position=(0.0, 0.0, own.outer_radius - SINKAGE),
+            rotation=[[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]],
+            velocity=((1.0 - slip) * RATE * own.outer_radius, 0.0, 0.0), angular_velocity=(0.0, RATE, 0.0),
+        )  # fmt: skip
+        total += [found.force[2], found.force[0], -found.moment[1]]
+    return dict(zip(FORCES, (total / PHASES / own.width).tolist(), strict=True))
+
+
+def rows(measured: Measured) -> list[Row]:
+    """The rows of the laws against the continuum, and of the continuum against finer cells of its own."""
+    table = outcome(measured, "held") or []
+    return [*_law_rows(measured, table), *_cell_rows(table)]
+
+
+def _over_slip(table: list[dict[str, float]]) -> list[dict[str, float]]:
+    own = [one for one in table if one["grousers"] and one["dx"] == CELL and one["mu_int"] == POPPY.mu_int]
+    return sorted(own, key=lambda one: one["prescribed_slip"])
+
+
+def _law_rows(measured: Measured, table: list[dict[str, float]]) -> list[Row]:
+    """The rows of the dynamic law over the slip, to be read: nothing is promised of a wheel that heaps and digs."""
+    law = LAWS[-1]
+    return [
+        Row(f"{law}, slip {one['prescribed_slip']:g}: {said}", got, "our continuum", unit, expected=expected)
+        for one in _over_slip(table)
+        for said, got, expected, unit, _ in _compared(measured[f"{law}/{one['prescribed_slip']:g}"], one)
+    ]
+
+
+def _cell_rows(table: list[dict[str, float]]) -> list[Row]:
+    """The rows of each run against that of the next larger cells, or of the same half a cell aside."""
+    rows = []
+    for grousers in sorted({one["grousers"] for one in table}):
+        for mu in sorted({one["mu_int"] for one in table}):
+            own = [o for o in table if (o["grousers"], o["mu_int"], o["prescribed_slip"]) == (grousers, mu, 0.3)]
+            for before, after, how in _pairs(own):
+                what = f"continuum, {'wheel' if grousers else 'disc'}, μ_int {mu:g}, {how}"
+                for said, got, expected, unit, size in _compared(after, before):
+                    note = NOTE if abs(got - expected) > CONVERGED * size else ""
+                    within = CONVERGED * size
+                    rows.append(near(f"{what}: {said}", got, expected, within, "itself before", unit=unit, note=note))
+    return rows
+
+
+def _compared(got: Any, expected: Any) -> Iterator[tuple[str, float, float, str, float]]:
+    """Each force's name, both its values and unit, and what differences count by: of the drawbar, the load."""
+    sizes = expected["load_N_m"], expected["load_N_m"], expected["torque_N"]
+    for name, size, unit in zip(FORCES, sizes, ("N/m", "N/m", "N"), strict=True):
+        yield name.partition("_")[0], got[name], expected[name], unit, abs(size)
+
+
+def _pairs(own: list[dict[str, float]]) -> list[tuple[dict[str, float], dict[str, float], str]]:
+    """Runs of one wheel that should agree, and in what they differ."""
+    level = sorted((one for one in own if not one["shift"]), key=lambda one: -one["dx"])
+    found = [(a, b, f"cells {1e3 * a['dx']:.3g} to {1e3 * b['dx']:.3g} mm") for a, b in itertools.pairwise(level)]
+    for one in own:
+        if one["shift"]:
+            same = next(other for other in level if other["dx"] == one["dx"])
+            found.append((same, one, f"half a cell of {1e3 * one['dx']:.3g} mm aside"))
+    return found
+
+
+def draw(measured: Measured, figure: Any) -> None:
+    """Draw load, drawbar and torque over the slip, of the continuum with its finer cells and of the laws."""
+    table = outcome(measured, "held") or []
+    coarse = _over_slip(table)
+    names = ("load [N/m]", "drawbar [N/m]", "torque [N]")
+    for axis, name, said in zip(figure.subplots(1, 3), FORCES, names, strict=True):
+        if coarse:
+            slip, force, noise = (
+                [one[column] for one in coarse] for column in ("prescribed_slip", name, f"{name}_noise")
+            )
+            axis.errorbar(slip, force, noise, fmt="ko", capsize=3, label=f"continuum, cells {1e3 * CELL:g} mm")
+        finer = [one for one in table if one["grousers"] and one["mu_int"] == POPPY.mu_int and one["dx"] < CELL]
+        for one, mark in zip(sorted((o for o in finer if not o["shift"]), key=lambda o: -o["dx"]), "v^", strict=False):
+            axis.plot(one["prescribed_slip"], one[name], f"C3{mark}", label=f"{1e3 * one['dx']:.3g} mm")
+        for law, line in zip(LAWS, ("--", "-"), strict=True):
+            axis.plot(SLIPS, [measured[f"{law}/{slip:g}"][name] for slip in SLIPS], f"C0{line}", label=law)
+        axis.set_xlabel("slip  $1 - v/(R\\omega)$ [-]")
+        axis.set_ylabel(said)
+        axis.grid(alpha=0.3)
+        axis.legend(fontsize=7)
+    figure.suptitle(f"Grousered wheel held {1e3 * SINKAGE:g} mm deep, 30 RPM")
