@@ -11,7 +11,7 @@ from rftsim.law import layout
 from rftsim.law.laws import CUBIC, QUARTIC, RESPONSES, Response
 from rftsim.law.tables import TABLE_C3, TABLE_C4
 from rftsim.model.readout import Instance
-from rftsim.warp import equation
+from rftsim.warp import equation, guess, linear
 from rftsim.warp.definite import mat66
 from rftsim.warp.force import PARTS, Kernels, kernels_of
 from rftsim.warp.frames import Sands, State
@@ -84,12 +84,12 @@ class WarpBed:
     def begin(self, m: Any, d: Any) -> None:
         """Find how the bodies move at the start of a step, and what their wheels left behind."""
         wp.launch(
-            equation.find_motions,
+            linear.find_motions,
             dim=(self.nworld, self._paths.dof.size),
             inputs=[self._surfaces, self._paths, m.body_rootid, d.xpos, d.subtree_com, d.cdof, self._model],
         )
         wp.launch(
-            equation.begin,
+            guess.begin,
             dim=self._over_bodies,
             inputs=[self._surfaces, self._paths, d.time, d.qvel, d.xmat, self.is_implicit, self._model, self._state],
         )
@@ -101,7 +101,7 @@ class WarpBed:
     def go_on(self, d: Any, velocity: Any) -> None:
         """Take the twists about which the force is linearised to those at a velocity, (nworld, nv)."""
         wp.launch(
-            equation.go_on,
+            guess.go_on,
             dim=self._over_bodies,
             inputs=[self._surfaces, self._paths, velocity, d.xmat, self._model, self._state],
         )
@@ -146,7 +146,7 @@ class WarpBed:
 
     def forget(self, reset: Any) -> None:
         """Forget the past of the worlds that are reset, (nworld,) of bool."""
-        wp.launch(equation.forget, dim=self._over_bodies, inputs=[reset, self._state, self._model])
+        wp.launch(linear.forget, dim=self._over_bodies, inputs=[reset, self._state, self._model])
 
 
 def _counterpart(model: mujoco.MjModel, body: int, onto: mujoco.MjModel) -> int:
@@ -182,14 +182,14 @@ def _put_sands(packed: Any) -> Any:
 
 def _make_state(nworld: int, nbody: int, nlane: int, paths: Any) -> tuple[Any, Any]:
     """What is known of bodies in many worlds, and their linearised wrenches; all zero."""
-    state, model = State(), equation.Model()
+    state, model = State(), linear.Model()
     shape = nworld, nbody
     state.slow, state.near = wp.zeros(nworld, dtype=float), wp.zeros(shape, dtype=int)
     state.rear, state.drop = wp.zeros(shape, dtype=wp.vec4), wp.zeros(shape, dtype=float)
     state.wrench = wp.zeros((*shape, nlane), dtype=wp.spatial_vector)
     state.parts = wp.zeros((*shape, nlane, PARTS), dtype=wp.mat33)
     state.twist = wp.zeros(shape, dtype=wp.spatial_vector)
-    model.clock, model.near_before = wp.full(shape, equation.NEVER, dtype=float), wp.zeros(shape, dtype=int)
+    model.clock, model.near_before = wp.full(shape, linear.NEVER, dtype=float), wp.zeros(shape, dtype=int)
     for name in ("twist", "wrench", "start", "strain", "start_before", "strain_before"):
         setattr(model, name, wp.zeros(shape, dtype=wp.spatial_vector))
     model.stiffness, model.secant = wp.zeros(shape, dtype=mat66), wp.zeros(shape, dtype=float)
