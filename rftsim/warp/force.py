@@ -204,7 +204,7 @@ def kernels_of(response: Response, table: tuple[tuple[float, ...], ...]) -> Kern
         s = stress(n, v, f.up, around, medium, bare)
         one = stress(n, ahead + ASIDE * first, f.up, around, medium, bare)
         two = stress(n, ahead + ASIDE * second, f.up, around, medium, bare)
-        m = s.along
+        m, mm = s.along, wp.outer(s.along, s.along)
         cosine = wp.dot(ahead, m)
         share = _share(cosine, speed * speed, edge)
         mobile = speed * radius
@@ -215,12 +215,12 @@ def kernels_of(response: Response, table: tuple[tuple[float, ...], ...]) -> Kern
         sunk = wp.outer(s.per_depth, f.up)
         braked = 2.0 * area * s.inertia / wp.max(cosine * speed, _TINY)
         width = 0.5 / (radius * _RAMP)
-        edge_on = _symmetric(weight * speed * wp.outer(s.per_depth, m))
-        jump = 0.5 / wp.max(wp.abs(cosine * speed + width), width)
-        slope = wp.where(share > 0.0 and share < 1.0, _RAMP / speed, 0.0)
+        press = wp.abs(wp.dot(s.per_depth, m)) * weight * speed
+        jump = -0.5 * press / wp.max(wp.abs(cosine * speed + width), width)
+        slope = wp.where(share > 0.0 and share < 1.0, -press * _RAMP / speed, 0.0)
         beside = _symmetric((share * weight / ASIDE) * turned - (later * share * area * mobile) * sunk)
-        g.whole = straight + beside + jump * edge_on + braked * wp.outer(m, m)
-        g.along = mobile * mobile * straight + (jump - slope) * edge_on
+        g.whole = straight + beside + (braked + jump) * mm
+        g.along = mobile * mobile * straight + (jump - slope) * mm
         return g
 
     @wp.kernel(module="unique", enable_backward=False)

@@ -35,7 +35,8 @@ def secant_for(change: float, speed: float):
     The force of a law that knows only the direction of motion jumps at rest. A tangent far from there is exact, and
     leads past it where the body stops; the secant leads to rest, and is wrong by the relative change of speed.
     """
-    return wp.clamp(wp.max(change / wp.max(speed, _TINY), 2.0 - 0.5 * speed / (LIMIT * V_C)), 0.0, 1.0)
+    resting = wp.clamp(2.0 - 0.5 * speed / (LIMIT * V_C), 0.0, 1.0)
+    return wp.max(wp.min(change / wp.max(speed, _TINY), 1.0), 2.0 * resting)
 
 
 @wp.func

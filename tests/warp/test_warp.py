@@ -151,8 +151,8 @@ def _apart(subject: Subject, h: float, duration: float, iterations: int) -> floa
 
 
 def test_a_hexapod_on_warp_goes_the_same_way() -> None:
-    """Half a second of the shipped hexapod's walk at 1 ms, within 1 % of the engine plugin's way."""
-    assert _apart(SUBJECTS["hexapod"], 1e-3, 0.5, rftsim.warp.ITERATIONS) < 0.01
+    """Half a second of the shipped hexapod's walk at 1 ms, within 2 % of the engine plugin's way."""
+    assert _apart(SUBJECTS["hexapod"], 1e-3, 0.5, rftsim.warp.ITERATIONS) < 0.02
 
 
 @pytest.mark.slow
