@@ -89,4 +89,5 @@ def forget(reset: wp.array(dtype=bool), state: State, model: Model):
         model.wrench[world, body] = wp.spatial_vector()
         model.stiffness[world, body] = mat66()
         model.twist[world, body] = wp.spatial_vector()
+        model.start[world, body] = wp.spatial_vector()
         state.near[world, body] = 0

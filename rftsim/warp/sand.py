@@ -8,7 +8,7 @@ import mujoco
 import mujoco_warp as mjw
 import numpy as np
 import warp as wp
-from mujoco_warp._src import derivative, forward, smooth, support
+from mujoco_warp._src import derivative, forward, io, smooth, support
 from mujoco_warp._src.types import Stage
 
 from rftsim.engine import layout
@@ -64,12 +64,20 @@ class WarpSand:
         shape = nworld, model.nv
         self._smooth, self._acceleration, self._velocity = (wp.zeros(shape, dtype=float) for _ in range(3))
         self._damped, self._matrix = (wp.zeros((nworld, model.nC), dtype=float) for _ in range(2))
-        self._factors: Any = None
+        blocks = io.m_block_layout(model)
+        sizes = blocks["total"] + (model.nC if blocks["has_sparse"] else 0), model.nv
+        self._factors = [wp.zeros((nworld, size), dtype=float) for size in sizes]
 
     def attach(self, m: Any) -> None:
-        """Have mujoco_warp's step call this sand, beside what it calls already."""
+        """Have mujoco_warp's step call this sand, beside what it calls already.
+
+        Raises:
+            SceneError: The integrator is none of Euler, implicit and implicitfast; bodies may sleep; energy is computed.
+        """
         if m.opt.integrator not in _INTEGRATORS:
             raise SceneError("sand on Warp needs the integrator Euler, implicit or implicitfast")
+        if m.opt.enableflags & (mjw.EnableBit.SLEEP | mjw.EnableBit.ENERGY):
+            raise SceneError("sand on Warp is part of the mass matrix: leave the flags sleep and energy off")
         m.callback.passive = _both(m.callback.passive, self.press)
         m.callback.sensor = _both(m.callback.sensor, self.read)
 
@@ -113,8 +121,6 @@ class WarpSand:
             )
         else:
             derivative.deriv_smooth_vel(m, d, self._damped)
-        if self._factors is None:
-            self._factors = wp.empty_like(d.qLD), wp.empty_like(d.qLDiagInv)
 
     def _solve(self, m: Any, d: Any, beds: "list[WarpBed]") -> None:
         """Go on to the velocity at which the linearised equation ends, without the rows of constraints."""

@@ -181,5 +181,9 @@ def test_what_warp_does_not_know_is_refused() -> None:
         rftsim.warp.put(_spec(BALL, terrain="dunes"))
     with pytest.raises(SceneError, match="MjSpec"):
         rftsim.warp.put(_spec(BALL).compile())
+    spec = _spec(BALL)
+    spec.option.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
+    with pytest.raises(SceneError, match="sleep and energy"):
+        rftsim.warp.put(spec)
     with pytest.raises(ValueError, match="no parameter 'xi'"):
         _settled(1, steps=0).sand.beds[0].vary("xi")
