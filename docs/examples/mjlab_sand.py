@@ -146,7 +146,7 @@ def on_sand(cfg: ManagerBasedRlEnvCfg) -> ManagerBasedRlEnvCfg:
     cfg.events = {name: event for name, event in cfg.events.items() if not name.startswith("foot_friction")}
     cfg.events["sand"] = EventTermCfg(func=Sand, mode="startup", params={"medium": "medium-sand", "law": "rft3d"})
     cfg.events["vary_sand"] = EventTermCfg(
-        func=vary_sand, mode="reset", params={"strength": (0.3, 1.0), "friction": (0.25, 0.55)}
+        func=vary_sand, mode="reset", params={"strength": (0.5, 2.0), "friction": (0.25, 0.55)}
     )
     return cfg
 

@@ -88,7 +88,6 @@ def follow(sim: Simulation, duration: float, watch: Watch | None = None, shots: 
     bodies, dim = len(sim.bodies), sim.particles.dim
     table = np.array(rows).reshape(len(rows), -1)
     forces, moments, ways = np.split(table[:, 1:], np.cumsum([sim.force.size, sim.moment.size]), axis=1)
-    placed, shape = ways.reshape(len(rows), bodies, 2, dim), (len(rows), bodies, -1)
-    return Track(
-        table[:, 0], placed[:, :, 0], placed[:, :, 1], forces.reshape(shape), moments.reshape(shape), frames
-    )  # fmt: skip
+    placed = ways.reshape(len(rows), bodies, 2, dim)
+    forces, moments = (x.reshape(len(rows), *of.shape) for x, of in ((forces, sim.force), (moments, sim.moment)))
+    return Track(table[:, 0], placed[:, :, 0], placed[:, :, 1], forces, moments, frames)

@@ -72,7 +72,7 @@ class WarpSand:
         """Have mujoco_warp's step call this sand, beside what it calls already.
 
         Raises:
-            SceneError: The integrator is none of Euler, implicit and implicitfast; bodies may sleep; energy is computed.
+            SceneError: The integrator is not Euler, implicit or implicitfast; bodies may sleep; energy is computed.
         """
         if m.opt.integrator not in _INTEGRATORS:
             raise SceneError("sand on Warp needs the integrator Euler, implicit or implicitfast")
