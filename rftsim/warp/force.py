@@ -119,7 +119,8 @@ def _sinking(surfaces: Surfaces, f: Frame, body: int, step: float):
     s.deepest = f.height - wp.dot(f.up, corner)
     s.margin = step * (wp.length(f.velocity) + wp.length(wp.max(wp.abs(low), wp.abs(high))) * wp.length(f.omega))
     by = step * wp.max(-wp.dot(f.velocity + wp.cross(f.omega, corner), f.up), 0.0)
-    s.later = 0.5 * step * by / (by + wp.max(s.deepest, _TINY))
+    much = by / (by + wp.max(s.deepest, _TINY))
+    s.later = 0.5 * step * much * much
     return s
 
 
