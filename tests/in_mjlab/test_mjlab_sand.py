@@ -75,7 +75,7 @@ def stand_on_cpu(env, laid, strength, start, steps):
 
 
 def test_worlds_sink_by_their_own_sand(env, laid):
-    """Each world's robot comes to stand where the engine plugin lets it in the same sand, within 3 mm."""
+    """Each world's robot comes to stand where the engine plugin lets it in the same sand, within 5 mm."""
     env.reset(seed=0)
     strength = torch.tensor([0.25, 0.5, 0.75, 1.0])
     laid.xi_n[:] = laid.medium.xi_n * strength
@@ -86,7 +86,7 @@ def test_worlds_sink_by_their_own_sand(env, laid):
     height, ctrl = env.sim.data.qpos.numpy()[:, 2], env.sim.data.ctrl.numpy()
     for world in range(WORLDS):
         there = stand_on_cpu(env, laid, float(strength[world]), (start[world], ctrl[world]), STEPS)
-        assert height[world] == pytest.approx(there, abs=0.003)
+        assert height[world] == pytest.approx(there, abs=0.005)
 
 
 def test_each_reset_draws_another_sand_within_bounds(env, laid):
@@ -96,7 +96,7 @@ def test_each_reset_draws_another_sand_within_bounds(env, laid):
     env.reset(env_ids=torch.tensor([2]))
     for now, then in zip((laid.xi_n, laid.mu_surf), before, strict=True):
         assert ((now != then) == torch.tensor([False, False, True, False])).all()
-    assert ((laid.xi_n >= 0.3 * laid.medium.xi_n) & (laid.xi_n <= laid.medium.xi_n)).all()
+    assert ((laid.xi_n >= 0.5 * laid.medium.xi_n) & (laid.xi_n <= 2.0 * laid.medium.xi_n)).all()
 
 
 def test_runs_of_mjlab_are_bit_identical(env):
