@@ -19,7 +19,7 @@ from pathlib import Path
 FOLDER = Path(__file__).parent / "tables"
 COLUMNS = "100"
 """Width that the commands print for."""
-WARP_CASES = "'heavy sphere' 'rolling wheel' 'legs, broken away' pull 'edge-on drag' drill re-entry slope weld"
+WARP_CASES = "'heavy sphere' 'rolling wheel' 'legs, broken away' 'edge-on drag' drill re-entry slope weld"
 """Hard cases that the page on Warp shows."""
 STUDIES = ("wheel", "runner", "plates", "measured", "scaling", "drill", "continuum", "motion", "held", "slope", "ruts")
 CHEAP = {

@@ -15,7 +15,7 @@ STEPS: Final = (2e-3, 5e-3)
 """Time steps that are played [s]."""
 CONVERGED: Final = 2e-4
 """Time step of the engine plugin's answers that both are held against [s]."""
-STATE: Final = ("qpos", "qvel", "act", "ctrl", "qfrc_applied", "xfrc_applied")
+STATE: Final = ("qpos", "qvel", "act", "ctrl", "qfrc_applied", "xfrc_applied", "mocap_pos", "mocap_quat")
 """What a script may set, and mujoco_warp is told before it steps."""
 
 wp.config.log_level = wp.LOG_WARNING
