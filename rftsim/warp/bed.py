@@ -184,7 +184,7 @@ def _make_state(nworld: int, nbody: int, nlane: int, paths: Any) -> tuple[Any, A
     """What is known of bodies in many worlds, and their linearised wrenches; all zero."""
     state, model = State(), linear.Model()
     shape = nworld, nbody
-    state.slow, state.near = wp.zeros(nworld, dtype=float), wp.zeros(shape, dtype=int)
+    state.near = wp.zeros(shape, dtype=int)
     state.rear, state.drop = wp.zeros(shape, dtype=wp.vec4), wp.zeros(shape, dtype=float)
     state.wrench = wp.zeros((*shape, nlane), dtype=wp.spatial_vector)
     state.parts = wp.zeros((*shape, nlane, PARTS), dtype=wp.mat33)

@@ -9,8 +9,17 @@ import warp as wp
 
 from rftsim.warp.definite import from_blocks, mat66, without_negative
 from rftsim.warp.frames import State
-from rftsim.warp.linear import Model, apply, twist_of, wrench_at
+from rftsim.warp.linear import Model, apply, rotated, twist_of, wrench_at
 from rftsim.warp.surfaces import Paths, Surfaces
+
+
+@wp.func
+def _gathered(surfaces: Surfaces, state: State, xmat: wp.array2d(dtype=wp.mat33), nlane: int, world: int, body: int):
+    """The wrench on a body from the threads' sums, world axes."""
+    wrench = wp.spatial_vector()
+    for lane in range(nlane):
+        wrench += state.wrench[world, body, lane]
+    return rotated(xmat[world, surfaces.body[body]], wrench)
 
 
 @wp.kernel(enable_backward=False)
@@ -19,10 +28,8 @@ def gather_wrenches(surfaces: Surfaces, state: State, xmat: wp.array2d(dtype=wp.
     world, body = wp.tid()
     wrench = wp.spatial_vector()
     if state.near[world, body] == 1:
-        for lane in range(nlane):
-            wrench += state.wrench[world, body, lane]
-    turn = xmat[world, surfaces.body[body]]
-    model.wrench[world, body] = wp.spatial_vector(turn * wp.spatial_top(wrench), turn * wp.spatial_bottom(wrench))
+        wrench = _gathered(surfaces, state, xmat, nlane, world, body)
+    model.wrench[world, body] = wrench
 
 
 @wp.kernel(enable_backward=False)
@@ -33,12 +40,8 @@ def gather(surfaces: Surfaces, state: State, xmat: wp.array2d(dtype=wp.mat33), n
         model.wrench[world, body] = wp.spatial_vector()
         model.stiffness[world, body] = mat66()
         return
-    wrench = wp.spatial_vector()
-    for lane in range(nlane):
-        wrench += state.wrench[world, body, lane]
+    model.wrench[world, body] = _gathered(surfaces, state, xmat, nlane, world, body)
     turn = xmat[world, surfaces.body[body]]
-    wrench = wp.spatial_vector(turn * wp.spatial_top(wrench), turn * wp.spatial_bottom(wrench))
-    model.wrench[world, body] = wrench
     vv, vw, ww = wp.mat33(0.0), wp.mat33(0.0), wp.mat33(0.0)
     along_vv, along_vw, along_ww = wp.mat33(0.0), wp.mat33(0.0), wp.mat33(0.0)
     for lane in range(nlane):

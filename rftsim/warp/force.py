@@ -11,8 +11,9 @@ import warp as wp
 from rftsim.law import leading
 from rftsim.law.exports import RAMP
 from rftsim.law.laws import Response
-from rftsim.law.layout import BLOCK, NO_RIM
+from rftsim.law.layout import BLOCK
 from rftsim.warp.frames import Frame, Sands, State, depth_of, depth_of_box, frame_of, is_clear, medium_of
+from rftsim.warp.guess import V_C
 from rftsim.warp.law import Edge, Medium, Plane, stress_of
 from rftsim.warp.surfaces import Surfaces
 from rftsim.warp.translate import LEAST, translate
@@ -26,7 +27,6 @@ PARTS: Final = 6
 _TINY: Final = wp.constant(LEAST)
 _RAMP: Final = wp.constant(RAMP)
 _BLOCK: Final = wp.constant(BLOCK)
-_NO_RIM: Final = wp.constant(NO_RIM)
 
 _share = translate(leading.share, {})
 
@@ -106,7 +106,7 @@ class Sinking:
     margin: float
     """The farthest that any of its points can move [m]."""
     later: float
-    """Time after which depths are taken [s]: of a body that sinks by much of its depth, up to the step."""
+    """Time after which depths are taken [s]: of a body that sinks by much of its depth, up to half a step."""
 
 
 @wp.func
@@ -186,7 +186,6 @@ def kernels_of(response: Response, table: tuple[tuple[float, ...], ...]) -> Kern
         x: wp.vec3,
         n: wp.vec3,
         area: float,
-        v_c: float,
         later: float,
         medium: Medium,
         edge: Edge,
@@ -198,7 +197,7 @@ def kernels_of(response: Response, table: tuple[tuple[float, ...], ...]) -> Kern
         if deep <= 0.0 or speed <= 0.0:
             return g
         bare.tolerance = edge.tolerance
-        radius = 1.0 / wp.sqrt(speed * speed + v_c * v_c)
+        radius = 1.0 / wp.sqrt(speed * speed + V_C * V_C)
         ahead = v / speed
         first = _sideways(ahead)
         second = wp.cross(ahead, first)
@@ -247,14 +246,14 @@ def kernels_of(response: Response, table: tuple[tuple[float, ...], ...]) -> Kern
         edge.tolerance = surfaces.edge_on[body]
         edge.ramp = _RAMP
         around.forward = f.forward
-        v_c, later, sums = state.slow[world], sinking.later, Sums()
+        later, sums = sinking.later, Sums()
         for block in range(surfaces.first_block[body] + lane, surfaces.first_block[body + 1], nlane):
             if depth_of_box(f, surfaces.middle[block], surfaces.half[block]) + sinking.margin <= 0.0:
                 continue
             start = surfaces.first[body] + _BLOCK * (block - surfaces.first_block[body])
             for i in range(start, wp.min(start + _BLOCK, surfaces.first[body + 1])):
                 x, n, area = surfaces.centre[i], surfaces.normal[i], surfaces.area[i]
-                sums = _added(sums, x, implicit_triangle(f, x, n, area, v_c, later, medium, edge, around))
+                sums = _added(sums, x, implicit_triangle(f, x, n, area, later, medium, edge, around))
         _keep(state, sums, world, body, lane)
 
     return Kernels(explicit, implicit)

@@ -34,8 +34,6 @@ class State:
     """Half-space whose free surface has dropped, body frame: normal and offset."""
     drop: wp.array2d(dtype=float)
     """By how much [m]."""
-    slow: wp.array(dtype=float)
-    """Speed v_c of each world below which a triangle's stress falls to zero [m/s], (nworld,)."""
     near: wp.array2d(dtype=int)
     """Whether a body may be in the sand."""
     wrench: wp.array3d(dtype=wp.spatial_vector)

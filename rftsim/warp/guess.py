@@ -9,8 +9,9 @@ from typing import Final
 import warp as wp
 
 from rftsim.warp.frames import State
-from rftsim.warp.linear import Model, twist_of
+from rftsim.warp.linear import Model, rotated, twist_of
 from rftsim.warp.surfaces import Paths, Surfaces
+from rftsim.warp.translate import LEAST
 
 V_C: Final = wp.constant(1e-4)
 """Speed v_c [m/s] below which a triangle's stress falls to zero."""
@@ -20,7 +21,7 @@ SHORT: Final = wp.constant(0.9)
 """The share of a motion's power against the sand after which a guess at the end of the step goes no further."""
 STIFFER: Final = wp.constant(1.25)
 """The derivative near rest over the secant: with less a plate on a slope rocked for ever, with 2 none broke away."""
-_TINY: Final = wp.constant(1e-30)
+_TINY: Final = wp.constant(LEAST)
 
 
 @wp.func
@@ -95,7 +96,6 @@ def begin(
         left = 1.0 - share
         model.twist[world, body] = wp.spatial_vector(turn * (left * v), turn * (left * w))
         state.twist[world, body] = wp.spatial_vector(turn * v, turn * w)
-        state.slow[world] = V_C
         model.secant[world, body] = secant_for(change, speed)
 
 
@@ -112,7 +112,7 @@ def go_on(
     world, body = wp.tid()
     twist = twist_of(paths, model, velocity, world, body)
     turn, held, length = xmat[world, surfaces.body[body]], model.strain[world, body], surfaces.gyration[body]
-    strain = wp.spatial_vector(turn * wp.spatial_top(held), turn * wp.spatial_bottom(held))
+    strain = rotated(turn, held)
     last = state.twist[world, body]
     whole = twist + strain - last
     change = before_rest(model.wrench[world, body], last, whole) * whole

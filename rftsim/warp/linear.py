@@ -27,7 +27,7 @@ class Model:
     strain: wp.array2d(dtype=wp.spatial_vector)
     """S, body axes."""
     secant: wp.array2d(dtype=float)
-    """How far the derivative is to be the secant along the motion, 0 to 1."""
+    """How far the derivative is to be the secant along the motion; 0 is the tangent, 1 the secant."""
     motion: wp.array2d(dtype=wp.spatial_vector)
     """The twist by each motion of Paths, (nworld, nmotion)."""
     clock: wp.array2d(dtype=float)
@@ -43,6 +43,12 @@ def apply(a: mat66, x: wp.spatial_vector):
     """The product of a matrix and a twist."""
     y = a * vec6(x[0], x[1], x[2], x[3], x[4], x[5])
     return wp.spatial_vector(y[0], y[1], y[2], y[3], y[4], y[5])
+
+
+@wp.func
+def rotated(turn: wp.mat33, x: wp.spatial_vector):
+    """A twist or a wrench in the axes that a rotation leads to."""
+    return wp.spatial_vector(turn * wp.spatial_top(x), turn * wp.spatial_bottom(x))
 
 
 @wp.func

@@ -40,7 +40,8 @@ class _Translation:
     """Translates kernels that share what names stand for, each once."""
 
     def __init__(self, names: Mapping[str, Any]) -> None:
-        self._names, self._made = names, {}  # type: Mapping[str, Any], dict[int, Any]
+        self._names = names
+        self._made: dict[int, Any] = {}
 
     def of(self, kernel: Kernel) -> Any:
         """The function of Warp that a kernel becomes."""
