@@ -1,8 +1,9 @@
 """The sand's share of a `touch` sensor: the pressure on those of its body's triangles that lie in the sensor's zone.
 
 MuJoCo adds up the normal forces of contacts that lie in the site's volume, or from which the way out of the body leads
-through it. Here a triangle's centroid is such a contact. The triangles' forces are those at the twist of the moment,
-and the wrench that was applied may be that at the end of the step, so they are scaled to agree with it.
+through it. Here a triangle's centroid is such a contact. The triangles' forces are those at the twist that the law felt
+in the step, or that of the moment, and the wrench that was applied may be a mean over the step, so they are scaled to
+agree with it.
 """
 
 from typing import Any, Final, NamedTuple
@@ -17,6 +18,7 @@ from rftsim.law.layout import PRESSED
 from rftsim.law.vectors import dot, to_world
 from rftsim.machine.compiling import exact
 from rftsim.machine.memory import doubles, int32s, matrix, pointer, release, stack_doubles, take
+from rftsim.solver import state
 from rftsim.solver.newton import CREEP, V_C
 
 _SPHERE: Final = CONSTANTS["sphere"]
@@ -24,7 +26,7 @@ _BOX: Final = CONSTANTS["box"]
 _COLUMNS: Final = len(PRESSED)
 _SAND: Final = instance.SAND_NUMBERS
 ALIGNED: Final = 0.9
-"""Cosine between the triangles' force and the wrench's from which on the twist of the moment tells how sand presses."""
+"""Cosine between the triangles' force and the wrench's from which on that twist tells how sand presses."""
 SLOW: Final = 1e-3
 """Speed [m/s] of the translation that is asked instead: no law's inertial term counts at it."""
 
@@ -47,6 +49,19 @@ def _creep(model, m, t, address, v, w):
         bodies.twist(t, instance.body(address, k), v, w)
         found = max(found, CREEP * (np.sqrt(dot(v, v)) + length * np.sqrt(dot(w, w))))
     return found
+
+
+@exact
+def _fill_felt(m, model, address, k, v, w):
+    """Fill v and w, (3,) each, with the twist that the law felt of the k-th body in the step, if it felt any."""
+    size = instance.head(address).state_size
+    kept = state.kept_at(state.kept(instance.pending(address, size).ctypes.data, pointer(m + model.nv), k))
+    felt, any_twist = kept.twist, False
+    for i in range(6):
+        any_twist = any_twist or felt[i] != 0.0
+    if any_twist:
+        for i in range(3):
+            v[i], w[i] = felt[i], felt[3 + i]
 
 
 @exact
@@ -112,6 +127,8 @@ def _pressed(model, data, m, d, t, address, k, site, is_implicit):
     v, w = doubles(stack_doubles(3), 3), doubles(stack_doubles(3), 3)
     v_c = _creep(model, m, t, address, v, w) if is_implicit else 0.0
     bodies.twist(t, body, v, w)
+    if is_implicit:
+        _fill_felt(m, model, address, k, v, w)
     pose = Pose(t.xpos[3 * body : 3 * body + 3], t.xmat[9 * body : 9 * body + 9], v, w)
     rows = matrix(memory, n, _COLUMNS)
     count, factor = _list_scaled(sand, surface, pose, wrench, v_c, rows)

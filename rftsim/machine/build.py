@@ -32,8 +32,9 @@ _OUTSIDE: Final = re.compile(
 _RAISED: Final = re.compile(r'(@\.const\.pickledata\.\S+ = .*\[\d+ x i8\]) c"[^"]*"')
 """Errors that numba would raise, which may name files of this machine; nobody reads them."""
 _FAILED: Final = "rftsim_failed"
-_UNCOUNTED: Final = "define void @NRT_MemInfo_call_dtor(ptr %memory) { unreachable }"
-"""Every array here is a view of memory that nobody counts references to."""
+_COUNTING: Final = re.compile(r"^define linkonce_odr void (@NRT_(?:in|de)cref)\(.*?^}$", re.MULTILINE | re.DOTALL)
+_UNCOUNTED: Final = r"define linkonce_odr void \1(ptr %memory) alwaysinline { ret void }"
+"""How numba counts references to an array, and how it does not: each is a view of memory that nobody counts."""
 
 
 def build(part: str, cpu: str | None = None) -> bytes:
@@ -46,12 +47,13 @@ def build(part: str, cpu: str | None = None) -> bytes:
         if llvm.address_of_symbol(name) is None:
             llvm.add_symbol(name, id(EXPORTED))
     own = {name: entry for name, entry in EXPORTED.items() if entry[0].__module__ in _PARTS[part]}
-    whole = llvm.parse_assembly(_UNCOUNTED)
+    whole = llvm.parse_assembly("")
     for name, (function, signature) in own.items():
         _LOG.info("compiling %s", name)
         compiled = njit(signature, no_cpython_wrapper=True, no_cfunc_wrapper=True)(function)
         result = compiled.overloads[signature.args]
-        whole.link_in(llvm.parse_assembly(_RAISED.sub(r"\1 zeroinitializer", compiled.inspect_llvm(signature.args))))
+        code = _RAISED.sub(r"\1 zeroinitializer", compiled.inspect_llvm(signature.args))
+        whole.link_in(llvm.parse_assembly(_COUNTING.sub(_UNCOUNTED, code)))
         whole.link_in(llvm.parse_assembly(_entry(name, signature, result.fndesc.mangled_name)))
     machine = _machine(cpu)
     _strip(whole, own, machine)

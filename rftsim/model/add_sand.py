@@ -130,7 +130,7 @@ def add_sand(
             at the velocity of the moment.
         tolerance: Error of a body's velocity, relative, to which the implicit force is solved for in each step, 1e-6 to
             0.1. A smaller one costs iterations, and wins little where the step itself errs more; a larger one spares
-            some, and lets bodies at rest creep faster.
+            some.
         iterations: Most iterations of one such solution, 1 to 60, of one evaluation of every body's force or more each.
             What is not solved by then is taken as it is, and counted by `rftsim.work` as `unsolved`. A smaller number
             bounds the time of a step, a larger one lets hard steps end within the tolerance.

@@ -6,7 +6,7 @@ from rftsim.machine.compiling import exact
 from rftsim.machine.memory import doubles, stack_doubles
 from rftsim.solver import equation, linear_algebra, linearised, sparse
 from rftsim.solver.equation import POINT
-from rftsim.solver.motion import add_wrench, differentiate, evaluate, generalised, speed_of, twist_of
+from rftsim.solver.motion import add_wrench, differentiate, evaluate, felt_twist, generalised, speed_of, twist_of
 
 CENTRED: Final = 3e-3
 """Effect of the force's change within a step on a body's velocity, relative, from which on it is counted."""
@@ -26,17 +26,18 @@ def centre(p, accepted):
         accepted: Whether `search` holds that step already.
     """
     v, start, end, mean = equation.velocity_of(p, POINT.best), equation.start(p), equation.end(p), equation.mean(p)
+    errors = equation.errors_of(p, POINT.best)
     if accepted:
         for k in range(v.size):
             end[k] = v[k] + equation.search(p)[k]
         _follow(p)
     elif equation.numbers(p).solved == 0.0:  # a step by what cannot overshoot, so that no body is kicked
         _complete(p)
-        linearised.solution(p, v, equation.residual_of(p, POINT.best), linearised.EXACT, end)
+        linearised.solution(p, v, errors, equation.residual_of(p, POINT.best), linearised.EXACT, end)
         _follow(p)
         return
     else:
-        linearised.solution(p, v, equation.residual_of(p, POINT.best), linearised.EXACT, end)
+        linearised.solution(p, v, errors, equation.residual_of(p, POINT.best), linearised.EXACT, end)
     for k in range(v.size):
         mean[k] = end[k] - start[k]
     if _largest(p, mean, end) <= 2.0:
@@ -53,7 +54,7 @@ def _complete(p):
     """Take the completed derivatives at the best point for the bodies' derivatives."""
     twist = doubles(stack_doubles(6), 6)
     for b in range(equation.head(p).nbody):
-        twist_of(p, b, equation.velocity_of(p, POINT.best), twist)
+        felt_twist(p, b, equation.velocity_of(p, POINT.best), twist)
         differentiate(p, b, twist, 1.0)
         linear_algebra.copy_matrix(equation.completed(p, b), equation.derivative(p, b))
         equation.kept(p, b).known = 1.0

@@ -50,6 +50,25 @@ def accelerations(p, change, out):
 
 
 @exact
+def errors_at(p, v, out):
+    """Fill out with J a - aref at a velocity at the end of the step, (nrow,)."""
+    start, change = equation.start(p), equation.change(p)
+    if out.size == 0:
+        return
+    for k in range(v.size):
+        change[k] = v[k] - start[k]
+    accelerations(p, change, out)
+
+
+@exact
+def errors_at_start(p, out):
+    """Fill out with J a - aref where the velocity does not change, (nrow,)."""
+    reference = equation.row_reference(p)
+    for i in range(out.size):
+        out[i] = -reference[i]
+
+
+@exact
 def add_forces(p, force, share, out):
     """Add a share of the rows' generalised force to out."""
     for i in range(force.size):

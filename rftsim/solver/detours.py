@@ -6,9 +6,18 @@ import numpy as np
 
 from rftsim.machine.compiling import exact
 from rftsim.machine.memory import doubles, stack_doubles
-from rftsim.solver import equation, linear_algebra, residual
+from rftsim.solver import constraint_rows, equation, linear_algebra, residual
 from rftsim.solver.equation import POINT
-from rftsim.solver.motion import add_wrench, differentiate, generalised, respond, size_of, speed_of, twist_of
+from rftsim.solver.motion import (
+    add_wrench,
+    differentiate,
+    felt_twist,
+    generalised,
+    respond,
+    size_of,
+    speed_of,
+    twist_of,
+)
 from rftsim.solver.residual import attempt
 from rftsim.solver.steps import BUDGET, DERIVATIVE, RESERVE, keep_best, move_on, predict, try_along, worth
 
@@ -39,7 +48,7 @@ def is_refused(p):
         if too_far:
             _shorten(p, crossing)
         return too_far
-    if new.missing < 0.9 * now.missing and after <= 0.2 * abs(before):
+    if new.missing < 0.5 * now.missing or (new.missing < 0.9 * now.missing and after <= 0.2 * abs(before)):
         return False
     _arrange_other(p, crossing)
     return True
@@ -118,12 +127,11 @@ def _ease(p):
 @exact
 def _softest(p):
     """The largest speed of a body, or that to which it is driven within the step [m/s]."""
-    numbers, v, driven = equation.numbers(p), equation.velocity_of(p, POINT.now), equation.solved(p)
-    residual.size(p, equation.force(p))
+    numbers, v, driven = equation.numbers(p), equation.velocity_of(p, POINT.now), equation.driven(p)
     soft = numbers.v_c
     for b in range(equation.head(p).nbody):
         speed = max(speed_of(p, b, equation.start(p)), speed_of(p, b, v))
-        soft = max(soft, max(speed, numbers.h * speed_of(p, b, driven)))
+        soft = max(soft, max(speed, speed_of(p, b, driven)))
     return soft
 
 
@@ -133,7 +141,7 @@ def _linearise_apart(p, fall):
     numbers, v, out = equation.numbers(p), equation.velocity_of(p, POINT.now), equation.wrench_of(p, POINT.spare, 0, 0)
     for b in range(equation.head(p).nbody):
         kept = equation.kept(p, b)
-        twist_of(p, b, v, kept.twist)
+        felt_twist(p, b, v, kept.twist)
         speed = size_of(kept.twist, equation.length(p)[b]) / (SLIDES * fall * numbers.v_c)
         slowed = min(max(speed * speed, 1.0 / fall), 1.0)
         for r in range(6):
@@ -154,7 +162,7 @@ def _share_to_rest(p, b, direction, share):
     The former is negative where the body does not come near to rest on the way.
     """
     a, c = doubles(stack_doubles(6), 6), doubles(stack_doubles(6), 6)
-    twist_of(p, b, equation.velocity_of(p, POINT.now), a)
+    felt_twist(p, b, equation.velocity_of(p, POINT.now), a)
     twist_of(p, b, direction, c)
     aa = ac = cc = 0.0
     for k in range(6):
@@ -186,7 +194,8 @@ def _rest_along(p, direction, share):
         generalised(p, POINT.now, 0, q)
         wrench = equation.wrench_of(p, POINT.now, b, 0)
         add_wrench(p, b, wrench, -1.0, q)
-        residual.fill(p, there, q, missing)
+        constraint_rows.errors_at(p, there, equation.row_tried(p))
+        residual.fill(p, there, equation.row_tried(p), q, missing)
         side = 1.0 if linear_algebra.dot(missing, direction) < 0.0 else -1.0
         found = max(t + side * BESIDE * equation.numbers(p).v_c / np.sqrt(square), 1e-12)
     return found * share

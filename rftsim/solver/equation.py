@@ -106,6 +106,8 @@ surface = _T.vector("nbody", int64s)
 _kept = _T.vectors(KEPT_NUMBERS, "nbody")
 is_fresh = _T.vector("nbody")
 """Whether a body's derivative was taken at the present point, (nbody,)."""
+strain, _ = _T.each("nbody", WRENCH)
+"""What holds a body at rest, as a twist that the law feels beside the motion, (6,)."""
 misfit = _T.vector("nbody")
 """Change of a body's force that its derivative did not foresee [N], (nbody,)."""
 
@@ -136,7 +138,7 @@ row_spring = _T.vector("nrow")
 row_zone = _T.vector("nrow", int64s)
 """Scratch: whether a row acts, see `constraint_rows`, int64, (nrow,)."""
 row_error = _T.vector("nrow")
-"""Scratch: J a - aref, (nrow,)."""
+"""J a - aref at the last solution of the linearised equation, (nrow,)."""
 row_force = _T.vector("nrow")
 """Scratch: the rows' forces, (nrow,)."""
 row_moved = _T.vector("nrow")
@@ -161,6 +163,8 @@ start = _T.vector("ndof")
 """v, the generalised velocity that the step starts from, (ndof,)."""
 force = _T.vector("ndof")
 """tau, the smooth generalised forces but the sand's, (ndof,)."""
+driven = _T.vector("ndof")
+"""The velocity change by that alone, (ndof,)."""
 
 # Its solution.
 progress = _T.record(PROGRESS)
@@ -171,6 +175,8 @@ velocity_of = _T.vectors("ndof", _POINTS)
 """Generalised velocity of a point, (ndof,)."""
 residual_of = _T.vectors("ndof", _POINTS)
 """The impulse that is missing there, (ndof,)."""
+errors_of = _T.vectors("nrow", _POINTS)
+"""J a - aref of the rows there, (nrow,)."""
 scores = _T.records(SCORES, _POINTS)
 """Record SCORES of point k."""
 _wrenches_of = _T.vectors(WRENCH, _POINTS, "nbody", 2)
@@ -208,6 +214,8 @@ others = _T.vector("ndof")
 """Scratch: the sand's generalised force on all bodies but one, (ndof,)."""
 mean = _T.vector("ndof")
 """Scratch: the mean velocity of a step, (ndof,)."""
+answered = _T.vector("ndof")
+"""Scratch: the velocity change by the rows' impulse, negative, (ndof,)."""
 difference = _T.vector("ndof")
 """Scratch: the impulse by which the force at the mean velocity differs, (ndof,)."""
 filtered = _T.vector("ndof")
@@ -238,6 +246,8 @@ late = _T.vector("ndof")
 """Scratch: the velocity change by that impulse, (ndof,)."""
 stopped = _T.vector("ndof")
 """Scratch: the velocity change of the step, (ndof,)."""
+pressed = _T.vector("ndof")
+"""Scratch: the acceleration by the sand's force at the later depths, (ndof,)."""
 unforced = _T.vector("ndof")
 """Scratch: the impulse missing without the sand, (ndof,)."""
 nothing = _T.vector("ndof")

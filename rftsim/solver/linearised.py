@@ -108,11 +108,14 @@ def is_indirect(p):
 
 
 @exact
-def solution(p, v, residual, which, out):
-    """Fill out with the velocity that solves the equation for the sand's force linearised at v, the rows exactly."""
+def solution(p, v, errors, residual, which, out):
+    """Fill out with the velocity that solves the equation for the sand's force linearised at v, the rows exactly.
+
+    `errors` are the rows' J a - aref at v, (nrow,), and `equation.row_error` is left with those at the solution.
+    """
     _linearise(p, which)
     if equation.head(p).nrow > 0:
-        _solve_with_rows(p, v, residual, which, out)
+        _solve_with_rows(p, v, errors, residual, which, out)
         return
     direction, nothing = equation.direction(p), equation.missing(p)
     if equation.numbers(p).is_factored == 0.0:
@@ -123,24 +126,23 @@ def solution(p, v, residual, which, out):
 
 
 @exact
-def _begin_with_rows(p, v, residual, out):
+def _begin_with_rows(p, v, errors, residual, out):
     """Take the linearised equation to v: fill out, the rows' x and forces, and what is missing but for the rows."""
-    h, start, change = equation.numbers(p).h, equation.start(p), equation.change(p)
-    x, force, fixed, missing = equation.row_error(p), equation.row_force(p), equation.fixed(p), equation.missing(p)
+    h, fixed, missing = equation.numbers(p).h, equation.fixed(p), equation.missing(p)
+    x, force = equation.row_error(p), equation.row_force(p)
     for k in range(v.size):
-        change[k] = v[k] - start[k]
         out[k] = v[k]
         fixed[k] = residual[k]
         missing[k] = residual[k]
-    constraint_rows.accelerations(p, change, x)
+    linear_algebra.copy(errors, x)
     constraint_rows.forces(p, x, force)
     constraint_rows.add_forces(p, force, h, fixed)
 
 
 @exact
-def _solve_with_rows(p, v, residual, which, out):
+def _solve_with_rows(p, v, errors, residual, which, out):
     """Newton's method on the rows, each step to where the missing impulse along it vanishes."""
-    _begin_with_rows(p, v, residual, out)
+    _begin_with_rows(p, v, errors, residual, out)
     h = equation.numbers(p).h
     x, force, moved = equation.row_error(p), equation.row_force(p), equation.row_moved(p)
     change, fixed, missing = equation.change(p), equation.fixed(p), equation.missing(p)
@@ -159,9 +161,7 @@ def _solve_with_rows(p, v, residual, which, out):
             out[k] += t * taken[k]
             fixed[k] += t * change[k]
             missing[k] = fixed[k]
-        for i in range(x.size):
-            x[i] += t * moved[i] / h
-        constraint_rows.forces(p, x, force)
+        linear_algebra.copy(equation.row_tried(p), x)
         constraint_rows.add_forces(p, force, -h, missing)
         if linear_algebra.dot(missing, missing) <= target:
             break
@@ -178,7 +178,10 @@ def _fill_direction(p):
 
 @exact
 def _along(p, slope, stiff, t):
-    """Missing impulse along `equation.direction` after a share t of it; slope and stiff are what is not the rows'."""
+    """Missing impulse along `equation.direction` after a share t of it; slope and stiff are what is not the rows'.
+
+    The rows' errors and forces there are left in `row_tried` and `row_force`.
+    """
     x, moved, tried, force = equation.row_error(p), equation.row_moved(p), equation.row_tried(p), equation.row_force(p)
     h, inverse = equation.numbers(p).h, 1.0 / equation.numbers(p).h
     for i in range(x.size):
@@ -189,8 +192,12 @@ def _along(p, slope, stiff, t):
 
 @exact
 def _crossing(p, slope, stiff):
-    """The share t of `equation.direction`, at most one, after which the missing impulse along it vanishes."""
-    low, at_low = 0.0, _along(p, slope, stiff, 0.0)
+    """The share t of `equation.direction`, at most one, after which the missing impulse along it vanishes.
+
+    It is the last one that `_along` was asked for.
+    """
+    h, force, moved = equation.numbers(p).h, equation.row_force(p), equation.row_moved(p)
+    low, at_low = 0.0, slope - h * linear_algebra.dot(force, moved)
     high, at_high = 1.0, _along(p, slope, stiff, 1.0)
     if at_high <= 1e-6 * abs(at_low) or at_low >= 0.0:
         return 1.0

@@ -23,6 +23,15 @@ def twist_of(p, b, v, out):
 
 
 @exact
+def felt_twist(p, b, v, out):
+    """Fill out with the twist that the law feels of body b at a generalised velocity: with its strain, (6,)."""
+    strain = equation.strain(p, b)
+    twist_of(p, b, v, out)
+    for r in range(6):
+        out[r] += strain[r]
+
+
+@exact
 def size_of(twist, length):
     """|velocity| + |angular velocity| times a length [m/s]."""
     u, w = twist[:3], twist[3:]
@@ -76,7 +85,7 @@ def evaluate(p, v, k):
     """Evaluate the wrenches at a velocity into point k."""
     twist = doubles(stack_doubles(6), 6)
     for b in range(equation.head(p).nbody):
-        twist_of(p, b, v, twist)
+        felt_twist(p, b, v, twist)
         respond(p, b, twist, equation.wrench_of(p, k, b, 0))
     equation.work(p).evaluations += 1.0
 

@@ -6,9 +6,12 @@ it chatters and is biased; here v+ solves
     M (v+ - v) = h (tau + J' f(v+) + Q(v+)),
 
 tau the other smooth forces, f the constraints' by MuJoCo's own law, Q the sand's with |v| / sqrt(|v|^2 + v_c^2) before
-each triangle's stress. The solver is Newton's method with kept derivatives of the sand (a rank-one update per body and
-iteration); each of its steps solves the constraints exactly for the sand's force linearised, which costs no evaluation.
-Where a step passes rest or the edge of a face, the next trial is at rest, or by a derivative that cannot overshoot.
+each triangle's stress. What rests does not creep for that: the law feels a body's twist and its strain, a twist that
+takes up the motion from step to step, up to some v_c, as sand gives way a little before it flows.
+
+The solver is Newton's method with kept derivatives of the sand (a rank-one update per body and iteration); each of its
+steps solves the constraints exactly for the sand's force linearised, which costs no evaluation. Where a step passes
+rest or the edge of a face, the next trial is at rest, or by a derivative that cannot overshoot.
 
 `p` is the address of the equation's table.
 """
@@ -17,10 +20,11 @@ from typing import Final
 
 from numba import types
 
+from rftsim.law.stress import TINY
 from rftsim.machine.compiling import exact
 from rftsim.machine.exports import address, entry
 from rftsim.machine.memory import doubles, stack_doubles
-from rftsim.solver import equation, linear_algebra, residual
+from rftsim.solver import constraint_rows, equation, linear_algebra, residual
 from rftsim.solver.centring import centre
 from rftsim.solver.detours import is_refused
 from rftsim.solver.equation import POINT
@@ -40,11 +44,13 @@ from rftsim.solver.steps import (
     worth,
 )
 
-V_C: Final = 3e-7
-"""Least speed v_c [m/s] below which a triangle's stress falls to zero; where all is at rest, bodies creep slower."""
-CREEP: Final = 1e-4
+V_C: Final = 1e-5
+"""Least speed v_c [m/s] below which a triangle's stress falls to zero."""
+CREEP: Final = 3e-4
 """v_c over the speed of the fastest body. A body at rest amid moving ones, loaded to near what the sand bears, is the
 hardest of all to solve for, and is so less often."""
+STRAIN: Final = 30.0
+"""The largest strain over v_c: the sand then bears 0.9994 of its strength at rest."""
 FORCE: Final = 2.0
 """Missing impulse that is allowed, over all impulses and the tolerance."""
 MOST_FORCE: Final = 6e-3
@@ -59,7 +65,7 @@ HELD_FORCE: Final = 0.1
 """Missing impulse that is allowed where one is, over all impulses and the tolerance."""
 STRICT: Final = 2.0
 """Iterations in which that holds."""
-ROUGH: Final = (4.0, 2e-2)
+ROUGH: Final = (2.0, 2e-2)
 """Iterations after which more may be missing, and how much, over all impulses. Where many small faces switch, no
 derivative tells how the force goes on; the velocities are right then, and the force of a step is off by that."""
 
@@ -91,6 +97,14 @@ def solve(p):
 
 
 @exact
+def hold(p, b, twist, out):
+    """Fill out with the strain of body b, over v_c, after a step in which the law felt a twist, (6,)."""
+    share = min(1.0 / equation.numbers(p).v_c, STRAIN / (size_of(twist, equation.length(p)[b]) + TINY))
+    for r in range(6):
+        out[r] = share * twist[r]
+
+
+@exact
 def _is_given_up(p):
     """Whether the solution ends at its best point: too many iterations, or a face on its edge: nothing is nearer."""
     progress, best = equation.progress(p), equation.scores(p, POINT.best)
@@ -104,9 +118,16 @@ def _begin(p):
     """Set the equation's scales, and evaluate it where the kept derivatives lead, or at the last velocity."""
     numbers, progress = equation.numbers(p), equation.progress(p)
     numbers.scale, numbers.v_c = numbers.h * residual.size(p, equation.force(p)), V_C
+    driven, acceleration = equation.driven(p), equation.solved(p)
+    for k in range(driven.size):
+        driven[k] = numbers.h * acceleration[k]
     progress.is_stale, known = 0.0, True
     for b in range(equation.head(p).nbody):
         numbers.v_c = max(numbers.v_c, CREEP * speed_of(p, b, equation.start(p)))
+    for b in range(equation.head(p).nbody):
+        strain, held = equation.strain(p, b), equation.kept(p, b).strain
+        for r in range(6):
+            strain[r] = numbers.v_c * held[r]
         equation.is_fresh(p)[b], equation.misfit(p)[b] = 0.0, 0.0
         known = known and equation.kept(p, b).known > 0.0
     progress.by_secant = progress.secants_left = progress.shortened = progress.failures = progress.iteration = 0.0
@@ -119,6 +140,7 @@ def _begin(p):
         progress.is_stale = 1.0
     elif now.error > 1.0 and now.missing > 0.3 * now.scale:  # a poor guess: is the start nearer?
         linear_algebra.copy(equation.start(p), equation.velocity_of(p, POINT.new))
+        constraint_rows.errors_at_start(p, equation.errors_of(p, POINT.new))
         attempt(p, POINT.new)
         progress.is_stale = 1.0
         if new.missing < now.missing:

@@ -17,10 +17,10 @@ def size(p, impulse):
 
 
 @exact
-def fill(p, v, q, out):
+def fill(p, v, x, q, out):
     """Fill out with the impulse that is missing at a velocity under a generalised force of the sand, (ndof,).
 
-    The impulse of the constraints is left in `equation.change`.
+    `x` are the rows' J a - aref there, (nrow,). The impulse of the constraints, negative, is left in `equation.change`.
     """
     h = equation.numbers(p).h
     start, tau, change = equation.start(p), equation.force(p), equation.change(p)
@@ -29,12 +29,11 @@ def fill(p, v, q, out):
     sparse.multiply(p, equation.mass(p), change, out)
     for k in range(v.size):
         out[k] -= h * (tau[k] + q[k])
-    if equation.head(p).nrow == 0:
-        return
-    x, force = equation.row_error(p), equation.row_force(p)
-    constraint_rows.accelerations(p, change, x)
-    constraint_rows.forces(p, x, force)
     linear_algebra.clear(change)
+    if x.size == 0:
+        return
+    force = equation.row_force(p)
+    constraint_rows.forces(p, x, force)
     constraint_rows.add_forces(p, force, -h, change)
     for k in range(v.size):
         out[k] += change[k]
@@ -42,16 +41,18 @@ def fill(p, v, q, out):
 
 @exact
 def attempt(p, k):
-    """Evaluate the equation at the velocity of point k, and score it; the velocity's error is in `equation.solved`."""
+    """Evaluate the equation at the velocity of point k, and score it; its rows' errors are filled already."""
     v, residual = equation.velocity_of(p, k), equation.residual_of(p, k)
     evaluate(p, v, k)
     q, step, scores = equation.sand_force(p), equation.numbers(p), equation.scores(p, k)
     generalised(p, k, 0, q)
-    fill(p, v, q, residual)
-    scale = step.scale + step.h * size(p, q)
+    fill(p, v, equation.errors_of(p, k), q, residual)
+    scale = step.scale
     if equation.head(p).nrow > 0:
         scale += size(p, equation.change(p))
-    scores.missing, scores.scale = size(p, residual), scale + TINY
+        linear_algebra.copy(equation.solved(p), equation.answered(p))
+    scores.missing = size(p, residual)
+    scores.scale = scale + _pressed(p, v, q) + TINY
     wrong, error = equation.solved(p), 0.0
     for b in range(equation.head(p).nbody):
         error = max(error, speed_of(p, b, wrong) / allowed(p, b, v))
@@ -59,16 +60,28 @@ def attempt(p, k):
 
 
 @exact
+def _pressed(p, v, q):
+    """Length of the sand's impulse in the mass metric, after `size` of what is missing at v: all else is known."""
+    start, driven, wrong, answered = equation.start(p), equation.driven(p), equation.solved(p), equation.answered(p)
+    has_rows, square = equation.head(p).nrow > 0, 0.0
+    for k in range(v.size):
+        rest = v[k] - start[k] - driven[k] - wrong[k]
+        square += q[k] * (rest + answered[k] if has_rows else rest)
+    return np.sqrt(max(equation.numbers(p).h * square, 0.0))
+
+
+@exact
 def allowed(p, b, v):
     """The error that body b's velocity may have at a generalised velocity [m/s]."""
-    return equation.numbers(p).tolerance * speed_of(p, b, v) + equation.numbers(p).v_c
+    return equation.numbers(p).tolerance * speed_of(p, b, v) + 0.1 * equation.numbers(p).v_c
 
 
 @exact
 def copy_point(p, origin, target):
-    """Copy a point: its velocity, residual, wrenches and scores."""
+    """Copy a point: its velocity, residual, errors of rows, wrenches and scores."""
     linear_algebra.copy(equation.velocity_of(p, origin), equation.velocity_of(p, target))
     linear_algebra.copy(equation.residual_of(p, origin), equation.residual_of(p, target))
+    linear_algebra.copy(equation.errors_of(p, origin), equation.errors_of(p, target))
     linear_algebra.copy(equation.wrenches_of(p, origin), equation.wrenches_of(p, target))
     known, copied = equation.scores(p, origin), equation.scores(p, target)
     copied.missing, copied.scale, copied.error = known.missing, known.scale, known.error

@@ -13,8 +13,8 @@ import numpy as np
 from rftsim.machine.compiling import exact
 from rftsim.solver import constraint_rows, equation, linear_algebra, sparse
 from rftsim.solver.equation import KIND, POINT
-from rftsim.solver.motion import generalised, speed_of, twist_of
-from rftsim.solver.newton import solve
+from rftsim.solver.motion import felt_twist, generalised, speed_of
+from rftsim.solver.newton import hold, solve
 from rftsim.solver.sinking import deepest, sink
 from rftsim.solver.step_equation import answer_to, force_to, prepare, reset
 from rftsim.solver.steps import BUDGET, RESERVE, worth
@@ -35,6 +35,9 @@ def parts_needed(p, time):
     h = equation.numbers(p).timestep
     after, start = equation.velocity_of(p, POINT.best), equation.start(p)
     grown, late, stopped = equation.grown(p), equation.late(p), equation.stopped(p)
+    pressed, q = equation.pressed(p), equation.others(p)
+    generalised(p, POINT.best, 1, q)
+    sparse.substitute(p, equation.mass_factors(p), q, pressed)
     generalised(p, POINT.best, 1, grown)
     generalised(p, POINT.best, 0, late)
     for k in range(after.size):
@@ -44,7 +47,8 @@ def parts_needed(p, time):
     worst, fineness = 0.0, FINENESS * equation.numbers(p).tolerance
     for b in range(equation.head(p).nbody):
         travel = time * speed_of(p, b, start)
-        error = min(time * max(speed_of(p, b, late), speed_of(p, b, stopped)) / 8.0, travel)
+        by_sand = min(speed_of(p, b, stopped), time * speed_of(p, b, pressed))
+        error = min(time * max(speed_of(p, b, late), by_sand) / 8.0, travel)
         if error <= fineness * SHALLOWEST:
             continue
         depth = deepest(p, b, after, time)
@@ -74,7 +78,7 @@ def split_step(p, parts):
                 part *= 0.25
                 continue
             equation.work(p).unsolved += 1.0
-        needed = max(needed, parts_needed(p, part))
+        needed = parts_needed(p, part)
         _add_contacts(p, part / h, equation.touched(p))
         sink(p, end, part)
         _add_part(p, part)
@@ -189,7 +193,8 @@ def remember(p):
     v = equation.velocity_of(p, POINT.best)
     for b in range(equation.head(p).nbody):
         kept = equation.kept(p, b)
-        twist_of(p, b, v, kept.twist)
+        felt_twist(p, b, v, kept.twist)
+        hold(p, b, kept.twist, kept.strain)
         linear_algebra.copy(equation.wrench_of(p, POINT.best, b, 1), kept.wrench)
 
 

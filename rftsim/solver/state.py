@@ -15,12 +15,13 @@ from rftsim.machine.records import record_at
 KEPT: Final = np.dtype(
     [
         *(("known", "f8"), ("drift", "f8"), ("parts", "f8")),
-        *(("wrench", "f8", WRENCH), ("twist", "f8", WRENCH), ("derivative", "f8", (WRENCH, WRENCH))),
+        *((name, "f8", WRENCH) for name in ("wrench", "twist", "strain")),
+        ("derivative", "f8", (WRENCH, WRENCH)),
     ]
 )
 """The sand's force on a body near where the last step ended: whether it is known; the length of the last part where
 that step was split, else zero [s], and the parts that the next one should have; the wrench that is foreseen at a
-twist, and its derivative by the twist."""
+twist that the law feels; the strain over v_c, see `newton`; the derivative of the wrench by the twist."""
 KEPT_NUMBERS: Final = numbers_in(KEPT)
 
 kept_at = record_at(KEPT)

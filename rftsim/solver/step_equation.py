@@ -1,7 +1,7 @@
 """The equation of a whole step as MuJoCo sees it, and the force that makes its step end at a given velocity."""
 
 from rftsim.machine.compiling import exact
-from rftsim.solver import equation, linear_algebra, linearised, residual, sparse
+from rftsim.solver import constraint_rows, equation, linear_algebra, linearised, residual, sparse
 
 
 @exact
@@ -32,7 +32,9 @@ def force_to(p, velocity, out):
     linear_algebra.copy(equation.velocity(p), equation.start(p))
     unforced, nothing = equation.unforced(p), equation.nothing(p)
     linear_algebra.clear(nothing)
-    residual.fill(p, velocity, nothing, unforced)
+    errors = equation.row_error(p)
+    constraint_rows.errors_at(p, velocity, errors)
+    residual.fill(p, velocity, errors, nothing, unforced)
     for k in range(out.size):
         out[k] = unforced[k] / h
 
@@ -43,5 +45,7 @@ def answer_to(p, q, out):
     reset(p)
     prepare(p, equation.numbers(p).timestep)
     v, missing = equation.velocity(p), equation.unforced(p)
-    residual.fill(p, v, q, missing)
-    linearised.solution(p, v, missing, linearised.NONE, out)
+    errors = equation.row_tried(p)
+    constraint_rows.errors_at_start(p, errors)
+    residual.fill(p, v, errors, q, missing)
+    linearised.solution(p, v, errors, missing, linearised.NONE, out)

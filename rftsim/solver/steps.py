@@ -4,9 +4,9 @@ from typing import Final
 
 from rftsim.machine.compiling import exact
 from rftsim.machine.memory import doubles, stack_doubles
-from rftsim.solver import equation, linear_algebra, linearised, residual
+from rftsim.solver import constraint_rows, equation, linear_algebra, linearised, residual
 from rftsim.solver.equation import POINT
-from rftsim.solver.motion import add_wrench, differentiate, twist_of
+from rftsim.solver.motion import add_wrench, differentiate, felt_twist
 from rftsim.solver.residual import attempt, copy_point
 
 BUDGET: Final = 60.0
@@ -41,15 +41,18 @@ def predict(p):
         kept = equation.kept(p, b)
         if kept.known == 0.0:
             continue
-        twist_of(p, b, start, twist)
+        felt_twist(p, b, start, twist)
         for r in range(6):
             twist[r] -= kept.twist[r]
         linear_algebra.multiply(equation.derivative(p, b), twist, wrench)
         for r in range(6):
             wrench[r] += kept.wrench[r]
         add_wrench(p, b, wrench, 1.0, q)
-    residual.fill(p, start, q, missing)
-    linearised.solution(p, start, missing, linearised.EXACT, equation.velocity_of(p, POINT.now))
+    errors = equation.errors_of(p, POINT.now)
+    constraint_rows.errors_at_start(p, errors)
+    residual.fill(p, start, errors, q, missing)
+    linearised.solution(p, start, errors, missing, linearised.EXACT, equation.velocity_of(p, POINT.now))
+    linear_algebra.copy(equation.row_error(p), errors)
 
 
 @exact
@@ -60,14 +63,14 @@ def choose_direction(p):
     if progress.by_secant > 0.0:
         twist = doubles(stack_doubles(6), 6)
         for b in range(equation.head(p).nbody):
-            twist_of(p, b, v, twist)
+            felt_twist(p, b, v, twist)
             differentiate(p, b, twist, 1.0)
         progress.secants_left -= 1.0
     elif progress.is_stale > 0.0:
         _refresh(p)
     which = linearised.COMPLETED if progress.by_secant > 0.0 else linearised.EXACT
     direction = equation.search(p)
-    linearised.solution(p, v, equation.residual_of(p, POINT.now), which, direction)
+    linearised.solution(p, v, equation.errors_of(p, POINT.now), equation.residual_of(p, POINT.now), which, direction)
     for k in range(v.size):
         direction[k] -= v[k]
     progress.share = 1.0
@@ -83,7 +86,7 @@ def _refresh(p):
         largest = max(largest, misfit[b] if fresh[b] == 0.0 else 0.0)
     for b in range(fresh.size):
         if fresh[b] == 0.0 and (misfit[b] >= POOR * largest or equation.progress(p).is_stale > 1.0):
-            twist_of(p, b, equation.velocity_of(p, POINT.now), twist)
+            felt_twist(p, b, equation.velocity_of(p, POINT.now), twist)
             differentiate(p, b, twist, 0.0)
             fresh[b], misfit[b], equation.kept(p, b).known = 1.0, 0.0, 1.0
     progress = equation.progress(p)
@@ -106,8 +109,11 @@ def move_on(p):
 
 @exact
 def try_along(p, direction, t, k):
-    """Evaluate the equation a share t of a direction from point POINT.now on, into point k."""
+    """Evaluate the equation a share t of the direction that was chosen from point POINT.now on, into point k."""
     v, new = equation.velocity_of(p, POINT.now), equation.velocity_of(p, k)
     for i in range(new.size):
         new[i] = v[i] + t * direction[i]
+    solved, errors, tried = equation.row_error(p), equation.errors_of(p, POINT.now), equation.errors_of(p, k)
+    for i in range(tried.size):
+        tried[i] = errors[i] + t * (solved[i] - errors[i])
     attempt(p, k)

@@ -10,10 +10,11 @@ from numba import types
 
 from rftsim.machine.compiling import exact
 from rftsim.machine.exports import address, entry
-from rftsim.machine.memory import doubles
+from rftsim.machine.memory import doubles, stack_doubles
 from rftsim.solver import equation, linear_algebra, sparse
 from rftsim.solver.equation import POINT
-from rftsim.solver.newton import V_C, solve
+from rftsim.solver.motion import size_of, twist_of
+from rftsim.solver.newton import STRAIN, solve
 from rftsim.solver.split_step import finish, parts_needed, remember, split_step
 from rftsim.solver.state import KEPT_NUMBERS
 from rftsim.solver.step_equation import answer_to, force_to, prepare, reset
@@ -102,10 +103,16 @@ def _work(p, after):
 
 @exact
 def _slack(p, allowed):
-    """Work that the sand may do in a step [J]: what is allowed, and that of creep."""
-    q, h = equation.out(p), equation.numbers(p).timestep
-    for k in range(q.size):
-        allowed += 3.0 * h * V_C * abs(q[k])
+    """Work that the sand may do in a step [J]: what is allowed, and what the strain of bodies at rest gives back."""
+    numbers, twist = equation.numbers(p), doubles(stack_doubles(6), 6)
+    if numbers.solved == 0.0:
+        return allowed
+    for b in range(equation.head(p).nbody):
+        twist_of(p, b, equation.velocity(p), twist)
+        if size_of(twist, equation.length(p)[b]) <= STRAIN * numbers.v_c:
+            wrench = equation.wrench(p, b)
+            given = abs(linear_algebra.dot(wrench, equation.strain(p, b))) + abs(linear_algebra.dot(wrench, twist))
+            allowed += numbers.timestep * given
     return allowed
 
 

@@ -8,7 +8,6 @@ import rftsim
 from rftsim.bench import hard_cases, stability
 from rftsim.files import Kept
 from rftsim.solver.state import KEPT
-from rftsim.solver.time_step import GAIN
 
 SAND = rftsim.Sand(xi_n=0.92e6, mu_surf=0.4)
 SHAPES = {
@@ -80,7 +79,10 @@ def test_it_is_the_default():
 
 
 def foreseen(trial, steps, before=None):
-    """Largest difference between the velocity that a step was solved for and MuJoCo's, over the largest velocity."""
+    """Largest difference between the velocity that a step was solved for and MuJoCo's, over the largest velocity.
+
+    Where all is at rest, over 1e-6 m/s.
+    """
     model, data = trial.model, trial.data
     worst = 0.0
     for _ in range(steps):
@@ -90,7 +92,7 @@ def foreseen(trial, steps, before=None):
         expected = data.plugin_state[1 + model.nv : 1 + 2 * model.nv]
         solved = expected != 0.0  # the degrees of freedom of islands that have a body near the sand
         if solved.any():
-            worst = max(worst, np.abs(expected - data.qvel)[solved].max() / np.abs(data.qvel).max())
+            worst = max(worst, np.abs(expected - data.qvel)[solved].max() / max(np.abs(data.qvel).max(), 1e-6))
     return worst
 
 
@@ -126,17 +128,23 @@ def test_limited_actuators_answer_as_foreseen():
 
 @pytest.mark.parametrize("seed", range(4))
 def test_random_starts_gain_no_energy(seed):
-    """MuJoCo's step does on the sand what was foreseen: no work by it, split steps and contacts included."""
+    """MuJoCo's step does on the sand what was foreseen, split steps and contacts included.
+
+    From the start on the sand has done no work, and in a step it gives back a microjoule of its strain at most.
+    """
     trial = hard_cases.legs(5e-3, "implicit")
     move = hard_cases.start_at_random(trial, seed)
     model, data = trial.model, trial.data
-    split = 0
+    split, total = 0, 0.0
     for _ in range(100):
         move(data)
         before = data.qvel.copy()
         mujoco.mj_step(model, data)
         sand = data.qfrc_passive - data.qfrc_spring - data.qfrc_damper - data.qfrc_gravcomp - data.qfrc_fluid
-        assert 0.5 * 5e-3 * sand @ (before + data.qvel) < 1e-9
+        work = 0.5 * 5e-3 * sand @ (before + data.qvel)
+        total += work
+        assert work < 1e-6
+        assert total < 1e-9
         split += (data.plugin_state[1 + 2 * model.nv :].view(KEPT)["drift"] > 0.0).any()
     assert split > 5
     assert not trial.failed
@@ -156,10 +164,10 @@ def test_forward_leaves_no_trace():
 
 
 @pytest.mark.parametrize("speed", [0.0, 1.0])
-def test_a_body_at_rest_creeps_slowly(speed):
-    """A ball that is pushed with half of what the sand bears creeps at v_c / sqrt(3).
+def test_a_body_at_rest_does_not_creep(speed):
+    """A ball that is pushed with half of what the sand bears gives way by v_c h / sqrt(3), and stops.
 
-    v_c is 3e-7 m/s, however fast a body moves that nothing joins it to: each island has an equation of its own.
+    v_c is 1e-5 m/s, however fast a body moves that nothing joins it to: each island has an equation of its own.
     """
     xml = """
         <mujoco>
@@ -180,7 +188,8 @@ def test_a_body_at_rest_creeps_slowly(speed):
     data.ctrl[0] = data.qvel[1] = speed
     mujoco.mj_step(model, data, nstep=200)
     assert data.qvel[1] == pytest.approx(speed, abs=1e-2)
-    assert data.qvel[0] == pytest.approx(3e-7 / np.sqrt(3.0), rel=0.05)
+    assert abs(data.qvel[0]) < 1e-12
+    assert data.qpos[0] == pytest.approx(1e-5 * 0.002 / np.sqrt(3.0), rel=0.05)
 
 
 def test_medians_are_over_what_has_an_answer(tmp_path):
@@ -228,15 +237,9 @@ def starts():
 
 @pytest.mark.slow
 def test_a_thousand_random_starts(starts):
-    """None is lost, and the sand's work in a step is at most `GAIN` of twice the kinetic energy, some joules."""
+    """None is lost, and the sand's work in a step is no more than what the strain under a foot holds, microjoules."""
     assert starts.failed == 0
-    assert starts.gain < 5.0 * GAIN
-
-
-@pytest.mark.slow
-def test_a_random_start_gains_a_tenth_of_a_microjoule(starts):
-    """The most in one step is 1.02e-7 J: the stepping lets rounding do 1e-7 of twice the kinetic energy."""
-    assert starts.gain == pytest.approx(1.02e-7, rel=0.1)
+    assert starts.gain < 5e-6
 
 
 @pytest.mark.slow
