@@ -177,7 +177,7 @@ def _accept(p):
     if progress.by_secant > 0.0:
         progress.is_stale = 1.0
     else:
-        left = new.missing / now.missing
+        left = new.missing / max(now.missing, TINY)
         progress.is_stale = 1.0 if left > 0.3 else 0.0
         progress.contraction = min(max(left, LEAST_LEFT), 1.0)
         _update(p, POINT.now, POINT.new)
