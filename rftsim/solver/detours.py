@@ -26,7 +26,7 @@ NEAR: Final = 0.25
 BESIDE: Final = 0.3
 """Speed, over v_c, at which a body is tried beside its rest."""
 EASED: Final = 2.0
-"""The failure after which a solution of several bodies is eased; a single one is at the first."""
+"""The failure after which a solution of several bodies is eased; that of one is where its rest does not help."""
 STAGES: Final = 4
 """Stages of that, after the first."""
 SLIDES: Final = 4.0
@@ -78,12 +78,14 @@ def _arrange_other(p, crossing):
     if not _all_fresh(p):
         progress.is_stale, progress.shortened = 2.0, 0.0  # all of them
         return
-    if equation.head(p).nbody == 1 and progress.failures == 0.0:
+    alone = equation.head(p).nbody == 1 and progress.failures == 0.0
+    is_asked = progress.shortened == 0.0 and not (alone and progress.rested > 0.0)
+    rest = _rest_along(p, equation.search(p), progress.share) if is_asked else 0.0
+    if alone and rest <= 0.0:
         progress.failures = 1.0
         _ease(p)
-        return
-    rest = _rest_along(p, equation.search(p), progress.share) if progress.shortened == 0.0 else 0.0
-    if rest > 0.0:
+    elif rest > 0.0:
+        progress.rested = 1.0
         try_along(p, equation.search(p), rest, POINT.new)
         keep_best(p, POINT.new)
         move_on(p)

@@ -42,15 +42,15 @@ PROGRESS: Final = np.dtype(
     [
         (name, "f8")
         for name in (
-            *("is_stale", "by_secant", "secants_left", "shortened", "failures"),
+            *("is_stale", "by_secant", "secants_left", "shortened", "rested", "failures"),
             *("iteration", "loosened", "share", "contraction"),
         )
     ]
 )
 """State of a solution under way: whether derivatives should be taken anew, those that misled (1) or all (2); whether
-the direction comes from the completed ones, and for how many more steps; how often the direction was shortened, and
-failed; iterations; factor on the tolerance; share of the direction that is tried; share of the missing impulse that a
-step leaves."""
+the direction comes from the completed ones, and for how many more steps; how often the direction was shortened; whether
+a body's rest was tried; how often the direction failed; iterations; factor on the tolerance; share of the direction
+that is tried; share of the missing impulse that a step leaves."""
 
 
 class Kinds(NamedTuple):

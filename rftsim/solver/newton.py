@@ -130,7 +130,8 @@ def _begin(p):
             strain[r] = numbers.v_c * held[r]
         equation.is_fresh(p)[b], equation.misfit(p)[b] = 0.0, 0.0
         known = known and equation.kept(p, b).known > 0.0
-    progress.by_secant = progress.secants_left = progress.shortened = progress.failures = progress.iteration = 0.0
+    progress.by_secant = progress.secants_left = progress.shortened = progress.rested = 0.0
+    progress.failures = progress.iteration = 0.0
     progress.loosened = progress.share = 1.0
     progress.contraction = KEPT_LEAVES
     predict(p)
