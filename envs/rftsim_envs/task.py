@@ -67,7 +67,7 @@ class Config:
     ground: Literal["sand", "rigid"] = "sand"
     sand: str = "poppy-seeds"
     law: str = "rft3d"
-    tolerance: float = 0.01
+    tolerance: float = 0.03
     iterations: int = layout.ITERATIONS
     strength: tuple[float, float] = (1.0, 1.0)
     friction: tuple[float, float] = (1.0, 1.0)
