@@ -19,7 +19,7 @@ from rftsim.law.vectors import dot, to_world
 from rftsim.machine.compiling import exact
 from rftsim.machine.memory import doubles, int32s, matrix, pointer, release, stack_doubles, take
 from rftsim.solver import state
-from rftsim.solver.newton import CREEP, V_C
+from rftsim.solver.newton import OF_FASTEST, V_C
 
 _SPHERE: Final = CONSTANTS["sphere"]
 _BOX: Final = CONSTANTS["box"]
@@ -41,13 +41,13 @@ class Pose(NamedTuple):
 
 
 @exact
-def _creep(model, m, t, address, v, w):
+def _least_speed(model, m, t, address, v, w):
     """The speed below which the implicit force falls to zero in this step [m/s]; v and w (3,) are overwritten."""
     found = V_C
     for k in range(instance.head(address).nbody):
         length = header_at(instance.surface(model, m, address, k)).gyration
         bodies.twist(t, instance.body(address, k), v, w)
-        found = max(found, CREEP * (np.sqrt(dot(v, v)) + length * np.sqrt(dot(w, w))))
+        found = max(found, OF_FASTEST * (np.sqrt(dot(v, v)) + length * np.sqrt(dot(w, w))))
     return found
 
 
@@ -125,7 +125,7 @@ def _pressed(model, data, m, d, t, address, k, site, is_implicit):
     if memory == 0:
         return np.nan
     v, w = doubles(stack_doubles(3), 3), doubles(stack_doubles(3), 3)
-    v_c = _creep(model, m, t, address, v, w) if is_implicit else 0.0
+    v_c = _least_speed(model, m, t, address, v, w) if is_implicit else 0.0
     bodies.twist(t, body, v, w)
     if is_implicit:
         _fill_felt(m, model, address, k, v, w)

@@ -46,7 +46,7 @@ from rftsim.solver.steps import (
 
 V_C: Final = 1e-5
 """Least speed v_c [m/s] below which a triangle's stress falls to zero."""
-CREEP: Final = 3e-4
+OF_FASTEST: Final = 3e-4
 """v_c over the speed of the fastest body. A body at rest amid moving ones, loaded to near what the sand bears, is the
 hardest of all to solve for, and is so less often."""
 STRAIN: Final = 30.0
@@ -123,7 +123,7 @@ def _begin(p):
         driven[k] = numbers.h * acceleration[k]
     progress.is_stale, known = 0.0, True
     for b in range(equation.head(p).nbody):
-        numbers.v_c = max(numbers.v_c, CREEP * speed_of(p, b, equation.start(p)))
+        numbers.v_c = max(numbers.v_c, OF_FASTEST * speed_of(p, b, equation.start(p)))
     for b in range(equation.head(p).nbody):
         strain, held = equation.strain(p, b), equation.kept(p, b).strain
         for r in range(6):

@@ -35,10 +35,9 @@ def parts_needed(p, time):
     h = equation.numbers(p).timestep
     after, start = equation.velocity_of(p, POINT.best), equation.start(p)
     grown, late, stopped = equation.grown(p), equation.late(p), equation.stopped(p)
-    pressed, q = equation.pressed(p), equation.others(p)
-    generalised(p, POINT.best, 1, q)
-    sparse.substitute(p, equation.mass_factors(p), q, pressed)
+    pressed = equation.pressed(p)
     generalised(p, POINT.best, 1, grown)
+    sparse.substitute(p, equation.mass_factors(p), grown, pressed)
     generalised(p, POINT.best, 0, late)
     for k in range(after.size):
         grown[k] = time * (grown[k] - late[k])
@@ -157,13 +156,10 @@ def _end(p):
 @exact
 def _add_contacts(p, share, out):
     """Add a share of the contacts' generalised force, in the part of a step that was just solved, to out."""
-    start, end, change = equation.start(p), equation.end(p), equation.change(p)
     x, force, kind = equation.row_error(p), equation.row_force(p), equation.row_kind(p)
     if x.size == 0:
         return
-    for k in range(out.size):
-        change[k] = end[k] - start[k]
-    constraint_rows.accelerations(p, change, x)
+    constraint_rows.errors_at(p, equation.end(p), x)
     constraint_rows.forces(p, x, force)
     for i in range(x.size):
         if kind[i] < KIND.contact:
