@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, Final, Literal
 
 import numpy as np
 
@@ -10,6 +10,10 @@ from rftsim.errors import RftsimError
 from rftsim_envs.physics import Array
 from rftsim_envs.settings import check_positive, convert_fields
 
+BATCH: Final = "batch"
+"""Name of MuJoCo's own batch of simulations, on threads."""
+WARP: Final = "warp"
+"""Name of mujoco_warp, on a GPU."""
 Drive = Callable[[float], Array]
 """Controller that sees nothing: an action, (naction,), from the time since the episode's start [s]."""
 
@@ -52,6 +56,7 @@ class Training:
             from all that was collected, and kept in the policy.
         start: Folder of a run whose policy is the first one, so that what it can do on easy ground need not be learnt
             anew on hard ground; empty for a policy that can do nothing yet.
+        physics: What steps the simulations: `batch`, MuJoCo's own on threads, or `warp`, mujoco_warp on a GPU.
     """
 
     steps: int = 1_000_000
@@ -70,6 +75,7 @@ class Training:
     log_std_init: float = -0.5
     normalise: bool = False
     start: str = ""
+    physics: Literal["batch", "warp"] = "batch"
 
     def __post_init__(self) -> None:
         convert_fields(self, TrainingError)

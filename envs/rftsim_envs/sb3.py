@@ -1,4 +1,4 @@
-"""A vector environment of Stable-Baselines3 on `mujoco.batch`."""
+"""A vector environment of Stable-Baselines3, on `mujoco.batch` or on a GPU."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -12,7 +12,8 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvS
 from rftsim_envs import ground, tasks
 from rftsim_envs.env import Action, spaces
 from rftsim_envs.episodes import Episodes, Observation
-from rftsim_envs.physics import Many
+from rftsim_envs.recipe import BATCH
+from rftsim_envs.simulations import side_by_side
 from rftsim_envs.tally import Tally
 from rftsim_envs.task import Task
 
@@ -28,6 +29,7 @@ class SandVecEnv(VecEnv):
         task: Name of a task, a class of one's own, or where that is: FILE.py:CLASS or MODULE:CLASS.
         n_envs: Number of simulations.
         threads: Number of threads; 0 for as many as there are processors.
+        physics: `batch`, which is MuJoCo's own on threads, or `warp`, which is mujoco_warp on a GPU.
         **settings: Fields of the task's Config.
 
     Attributes:
@@ -35,15 +37,16 @@ class SandVecEnv(VecEnv):
         outcome: Outcome of the last step, before new episodes began.
 
     Raises:
-        ConfigError: No such task or setting.
+        ConfigError: No such task, setting or physics.
+        SceneError: Warp does not know the sand: terrain, or ruts.
     """
 
-    def __init__(self, task: "str | type[Task]", n_envs: int, threads: int = 0, **settings: Any) -> None:
-        if n_envs < 1 or threads < 0:
-            raise ValueError(f"n_envs must be at least 1 and threads 0, not {n_envs} and {threads}")
+    def __init__(
+        self, task: "str | type[Task]", n_envs: int, threads: int = 0, physics: str = BATCH, **settings: Any
+    ) -> None:
         self.task = tasks.make(task, settings)
         self.config = self.task.config
-        self.physics = Many(ground.lay(self.task), n_envs, threads)
+        self.physics = side_by_side(ground.lay(self.task), n_envs, threads, physics)
         self.episodes = Episodes(self.task, self.physics)
         self.rngs = [np.random.default_rng() for _ in range(n_envs)]
         self._tally, self._action = Tally(n_envs), np.zeros((n_envs, self.task.naction), np.float32)

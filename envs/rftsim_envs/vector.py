@@ -1,4 +1,4 @@
-"""A vector environment of Gymnasium on `mujoco.batch`."""
+"""A vector environment of Gymnasium, on `mujoco.batch` or on a GPU."""
 
 from typing import Any
 
@@ -11,7 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from rftsim_envs import ground, tasks
 from rftsim_envs.env import Action, spaces
 from rftsim_envs.episodes import Episodes, Observation
-from rftsim_envs.physics import Array, Flags, Many
+from rftsim_envs.physics import Array, Flags
+from rftsim_envs.recipe import BATCH
+from rftsim_envs.simulations import side_by_side
 from rftsim_envs.task import Task
 
 
@@ -25,20 +27,22 @@ class SandVectorEnv(VectorEnv[Observation, Action, NDArray[np.generic]]):
         task: Name of a task, a class of one's own, or where that is: FILE.py:CLASS or MODULE:CLASS.
         num_envs: Number of simulations.
         threads: Number of threads; 0 for as many as there are processors.
+        physics: `batch`, which is MuJoCo's own on threads, or `warp`, which is mujoco_warp on a GPU.
         **settings: Fields of the task's Config.
 
     Raises:
-        ConfigError: No such task or setting.
+        ConfigError: No such task, setting or physics.
+        SceneError: Warp does not know the sand: terrain, or ruts.
     """
 
     metadata = {"autoreset_mode": AutoresetMode.SAME_STEP}  # noqa: RUF012, as Gymnasium has it
 
-    def __init__(self, task: "str | type[Task]", num_envs: int = 1, threads: int = 0, **settings: Any) -> None:
-        if num_envs < 1 or threads < 0:
-            raise ValueError(f"num_envs must be at least 1 and threads 0, not {num_envs} and {threads}")
+    def __init__(
+        self, task: "str | type[Task]", num_envs: int = 1, threads: int = 0, physics: str = BATCH, **settings: Any
+    ) -> None:
         self.task, self.num_envs = tasks.make(task, settings), num_envs
         self.config = self.task.config
-        self.episodes = Episodes(self.task, Many(ground.lay(self.task), num_envs, threads))
+        self.episodes = Episodes(self.task, side_by_side(ground.lay(self.task), num_envs, threads, physics))
         self.single_observation_space, self.single_action_space = spaces(self.episodes)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)

@@ -77,15 +77,15 @@ def train(
     Raises:
         TrainingError: The folder belongs to another plan or to another process, or it cannot be written.
     """
-    folder = Folder(path)
-    updates, total = plan.training.updates(), sum(plan.training.updates()) * plan.training.n_envs
+    folder, training = Folder(path), plan.training
+    updates, total = training.updates(), sum(training.updates()) * training.n_envs
     if folder.done:
         folder.check(plan)
         return Trained(total, total, True)
-    env = SandVecEnv(plan.task, plan.training.n_envs, threads, **plan.settings)
-    model = make_model(plan.training, env, plan.seed)  # what cannot be is refused before anything is written
-    if plan.training.start and not folder.checkpoint.is_file():
-        before = Folder(plan.training.start)
+    env = SandVecEnv(plan.task, training.n_envs, threads, training.physics, **plan.settings)
+    model = make_model(training, env, plan.seed)  # what cannot be is refused before anything is written
+    if training.start and not folder.checkpoint.is_file():
+        before = Folder(training.start)
         take_over(model.policy, read_policy(before), before)
     with folder.opened(plan):
         run = _Run(plan, env, model, folder, tensorboard)
