@@ -1,4 +1,4 @@
-"""What can step many simulations side by side."""
+"""Choose what steps many simulations side by side: MuJoCo's batch, or mujoco_warp."""
 
 import importlib.util
 from typing import Final

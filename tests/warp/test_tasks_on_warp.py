@@ -8,10 +8,8 @@ import numpy as np
 import pytest
 from rftsim_envs import SandVectorEnv
 from rftsim_envs.physics import Array
-from rftsim_envs.recipe import BATCH, WARP
+from rftsim_envs.recipe import BATCH, WARP, Training, TrainingError
 from rftsim_envs.task import ConfigError
-from rftsim_envs.training import ppo
-from rftsim_envs.training.folder import make_plan
 
 from rftsim.errors import SceneError
 
@@ -113,6 +111,8 @@ def test_a_rigid_floor_and_a_look_at_it() -> None:
 
 def test_a_policy_is_trained_on_warp(tmp_path: Path) -> None:
     """PPO's two updates on Warp leave a folder that says so."""
+    ppo = pytest.importorskip("rftsim_envs.training.ppo", reason="PPO is of the extra train", exc_type=ImportError)
+    make_plan = pytest.importorskip("rftsim_envs.training.folder").make_plan
     changes = {"steps": 48, "n_envs": N, "n_steps": 8, "batch_size": 12, "n_epochs": 1, "physics": WARP}
     plan = make_plan(TASK, {}, changes)
     assert ppo.train(plan, tmp_path) == (48, 0, True)
@@ -125,7 +125,7 @@ def test_a_policy_is_trained_on_warp(tmp_path: Path) -> None:
         (lambda: SandVectorEnv("CLegHexapod", 2, physics="abacus"), ConfigError, "batch, warp"),
         (lambda: SandVectorEnv("CLegHexapod", 2, physics=WARP, terrain="dunes"), SceneError, "plane without ruts"),
         (lambda: SandVectorEnv("CLegHexapod", 0, physics=WARP), ValueError, "at least 1"),
-        (lambda: make_plan(TASK, {}, {"physics": "abacus"}), Exception, "'batch' or 'warp'"),
+        (lambda: Training(physics="abacus"), TrainingError, "'batch' or 'warp'"),
     ],
 )
 def test_what_warp_does_not_know_is_refused(make: Callable[[], object], error: type[Exception], said: str) -> None:
