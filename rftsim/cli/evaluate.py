@@ -35,7 +35,7 @@ class Evaluate:
     """Score trained policies on a grid of grounds, without their noise; episodes are seeded, the same for all.
 
     A folder is that of one run of `rftsim train`, or of several (--seeds), which count together. Several folders give
-    one table, a row for each: with --on rigid,sand that of transfer.
+    one table, a row for each: with --on rigid,sand that of transfer, with a dash where a law cannot have a sand.
 
     Example: rftsim evaluate out/runner --baseline --plot runner.png
     """
@@ -77,11 +77,13 @@ class Evaluate:
         plans = {group: Folder(own[0]).plan() for group, own in runs.items()}
         default = evaluate.grid(plans[self.runs[0]]) if len(runs) == 1 else ["sand", "rigid"]
         grounds = default if self.on is None else [name.strip() for name in self.on.split(",")]
-        jobs = {}
-        for run, name in itertools.product(itertools.chain(*runs.values()), grounds):
-            if evaluate.settings_on(Folder(run).plan(), name) is None:
-                raise RftsimError(f"{name} has no density, which the law of {run} needs")
-            jobs[f"{run} on {name}"] = (run, name, self.episodes, self.seed, self.threads, self.baseline)
+        for name in grounds:
+            if all(evaluate.settings_on(plan, name) is None for plan in plans.values()):
+                raise RftsimError(f"{name} has no density, which the law of {', '.join(map(str, runs))} needs")
+        jobs = {
+            f"{run} on {name}": (run, name, self.episodes, self.seed, self.threads, self.baseline)
+            for run, name in itertools.product(itertools.chain(*runs.values()), grounds)
+        }
         with needing("ray"), Progress(console=Console(stderr=True), transient=True, disable=is_quiet(self.json)) as bar:
             task = bar.add_task("episodes", total=len(jobs))
             found = spread(evaluate.score, jobs, self.ray, lambda name, scores: bar.advance(task))

@@ -401,6 +401,21 @@ def test_several_runs_make_a_table_of_transfer(finished, tmp_path, capsys):
     assert (code, "holds no training run" in " ".join(err.split())) == (2, True)
 
 
+def test_a_sand_that_a_law_cannot_have_is_left_out(finished, tmp_path, capsys):
+    """medium-sand has no density: of two runs the one whose law needs it has a dash there, and alone it is refused."""
+    ppo.train(make_plan(TASK, SHORT | {"law": "rft2d"}, TINY), tmp_path)
+    given = ("--on", "sand,medium-sand", "--episodes", 2, "--markdown")
+    code, out, _ = call(capsys, "evaluate", finished, tmp_path, *given)
+    first, second = (row.split("|")[2:4] for row in out.splitlines()[2:4])
+    assert code == 0
+    assert ([cell.strip() == "-" for cell in first], [cell.strip() == "-" for cell in second]) == (
+        [False, True],
+        [False, False],
+    )
+    code, _, err = call(capsys, "evaluate", finished, *given)
+    assert (code, "has no density" in " ".join(err.split())) == (2, True)
+
+
 def test_the_grid_has_each_ground_once():
     found = evaluate.grid(make_plan(TASK))
     assert "as trained" in found
