@@ -64,7 +64,13 @@ class CLegHexapod(Task):
     edge = parts.AS_MESHED
     naction = len(LEGS)
     training = Training(
-        steps=400_000, n_steps=64, batch_size=256, n_epochs=10, learning_rate=8e-4, layers=(128, 128), log_std_init=-2.3
+        steps=400_000,
+        n_steps=64,
+        batch_size=1024,
+        n_epochs=10,
+        learning_rate=1e-3,
+        layers=(128, 128),
+        log_std_init=-2.3,
     )
     config: HexapodConfig
 

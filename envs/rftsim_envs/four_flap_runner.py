@@ -66,7 +66,7 @@ class FourFlapRunner(Task):
     length = 2.0 * RUNNER.outer_radius
     edge = 2 * RUNNER.width
     naction = 1
-    training = Training(steps=300_000, n_steps=64, batch_size=256, n_epochs=10, learning_rate=8e-4, log_std_init=-2.0)
+    training = Training(steps=300_000, n_steps=64, batch_size=1024, n_epochs=10, learning_rate=1e-3, log_std_init=-2.0)
     config: RunnerConfig
 
     def build(self) -> mujoco.MjSpec:
