@@ -1,4 +1,4 @@
-"""Training as a person uses it: what is written, how it goes on, what it refuses; play, evaluate, and recordings."""
+"""Training as a person uses it: what is written, how it goes on, what it refuses."""
 
 import errno
 import json
@@ -12,45 +12,19 @@ import time
 import gymnasium as gym
 import numpy as np
 import pytest
+from short_runs import SHORT, STEPS, TASK, TINY, call
 
 pytest.importorskip("stable_baselines3")
 
-from rftsim_envs import tasks, watch
 from rftsim_envs.env import SandEnv
 from rftsim_envs.recipe import Training, TrainingError
 from rftsim_envs.sb3 import SandVecEnv
-from rftsim_envs.training import actors, evaluate, folder, network, ppo
+from rftsim_envs.training import actors, folder, network, ppo
 from rftsim_envs.training.folder import Folder, make_plan
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import DummyVecEnv
 
-import rftsim
-from rftsim.cli import evaluate as results
-from rftsim.cli import main
 from rftsim.cli.train import interruptible
-
-TASK = "FourFlapRunner"
-SHORT = {"duration": 0.3}
-STEPS = tasks.make(TASK, SHORT).config.steps
-TINY = {"steps": 500, "n_envs": 4, "n_steps": 32, "batch_size": 32, "n_epochs": 2, "layers": (8,)}
-
-
-def call(capsys, *arguments):
-    """Exit code, standard output and standard error of one command."""
-    code = 0
-    try:
-        main([str(argument) for argument in arguments])
-    except SystemExit as end:
-        code = end.code
-    return code, *capsys.readouterr()
-
-
-@pytest.fixture(scope="module")
-def finished(tmp_path_factory):
-    """The folder of a finished run."""
-    path = tmp_path_factory.mktemp("run")
-    assert ppo.train(make_plan(TASK, SHORT, TINY), path) == (500, 0, True)
-    return path
 
 
 def parameters(path):
@@ -272,66 +246,6 @@ def test_updates_make_the_steps_asked_for(steps, n_envs, n_steps):
     assert max(updates) - min(updates) <= 1
 
 
-def test_a_policy_is_played(finished, capsys, tmp_path):
-    arguments = ("play", finished, "--episodes", 2, "--json")
-    report = json.loads(call(capsys, *arguments)[1])
-    assert report == json.loads(call(capsys, *arguments)[1])
-    assert report["actions"] == "policy"
-    env = SandEnv(TASK, **SHORT)
-    seen, _ = env.reset(seed=0)
-    model, total, done = PPO.load(finished / "policy.zip", device="cpu"), 0.0, False
-    while not done:
-        seen, reward, terminated, truncated, _ = env.step(model.predict(seen, deterministic=True)[0])
-        total, done = total + reward, terminated or truncated
-    assert report["episodes"][0]["r"] == pytest.approx(total, rel=1e-12)
-    code, out, _ = call(capsys, "play", TASK, "--actions", "zero", "--seconds", 0.1, "--set", "ground=rigid")
-    assert code == 0
-    assert "return" in out
-    code, _, err = call(capsys, "play", TASK, "--actions", "policy")
-    assert (code, "it has no policy" in " ".join(err.split())) == (2, True)
-
-
-def test_a_recording_reads_back_the_wrench(finished, tmp_path, capsys):
-    pytest.importorskip("rerun")
-    path = tmp_path / "played.rrd"
-    assert call(capsys, "play", finished, "--record", path)[0] == 0
-    force, motion = read(path, "/sand/force"), read(path, "/motion/speed")
-    assert len(motion) == STEPS
-    env = SandEnv(TASK, **SHORT)
-    env.reset(seed=0)
-    actor, wheel = actors.trained(Folder(finished))(env.episodes), env.model.body("wheel").id
-    seen = env.episodes.observation()
-    for k in range(STEPS):
-        seen, _, _, _, info = env.step(actor(np.reshape(seen, (1, -1)), 0.0)[0])
-        np.testing.assert_array_equal(force[k], rftsim.wrenches(env.model, env.data).force[wheel])
-        assert motion[k] == info["speed"]
-    assert np.linalg.norm(force, axis=1).max() > 10.0
-
-
-def read(path, start):
-    """The values under an entity, in time's order, (n, ...)."""
-    from rerun.chunk import RrdReader
-
-    found = []
-    for chunk in RrdReader(path).stream().to_chunks():
-        if chunk.entity_path.startswith(start):
-            batch = chunk.to_record_batch()
-            if "Scalars:scalars" in batch.schema.names:  # else how it is drawn
-                found += batch.column("Scalars:scalars").to_pylist()
-    values = np.array(found)
-    return values[:, 0] if values.shape[1] == 1 else values
-
-
-def test_a_film_has_a_picture_for_each_thirtieth_of_a_second(tmp_path, capsys):
-    av = pytest.importorskip("av")
-    assert call(capsys, "play", "Hopper", "--seconds", 0.5, "--video", tmp_path / "film.mp4")[0] == 0
-    with av.open(str(tmp_path / "film.mp4")) as film:
-        pictures = [frame.to_ndarray(format="rgb24") for frame in film.decode(video=0)]
-    assert len(pictures) == 15
-    assert pictures[0].shape == (540, 960, 3)
-    assert min(picture.std() for picture in pictures) > 5.0
-
-
 def test_what_is_not_installed_is_said(tmp_path, capsys, monkeypatch):
     monkeypatch.setitem(sys.modules, "av", None)
     code, _, err = call(capsys, "play", TASK, "--video", tmp_path / "film.mp4")
@@ -340,99 +254,6 @@ def test_what_is_not_installed_is_said(tmp_path, capsys, monkeypatch):
     monkeypatch.setitem(sys.modules, "ray", None)
     code, _, err = call(capsys, "train", TASK, "--out", tmp_path / "run", "--ray", "local")
     assert (code, "pip install 'rftsim[ray]'" in " ".join(err.split())) == (2, True)
-
-
-def test_one_of_many_is_recorded_as_one_alone(tmp_path):
-    pytest.importorskip("rerun")
-    many, one = SandVecEnv(TASK, 3, **SHORT), SandEnv(TASK, **SHORT)
-    many.seed(5)
-    many.reset()
-    one.reset(seed=6)
-    action = np.full((3, 1), 0.5, np.float32)
-    with (
-        watch.Watch(many.episodes, tmp_path / "many.rrd", i=1) as seen,
-        watch.Watch(one.episodes, tmp_path / "one.rrd") as other,
-    ):
-        for _ in range(10):
-            many.step(action)
-            seen.log(many.outcome.info)
-            other.log(one.step(action[1])[4])
-    for name in ("/motion/speed", "/reward/power", "/slip/slip", "/power/power"):
-        np.testing.assert_array_equal(read(tmp_path / "many.rrd", name), read(tmp_path / "one.rrd", name))
-    assert np.ptp(read(tmp_path / "one.rrd", "/motion/speed")) > 0.0
-
-
-def test_a_policy_is_scored_on_grounds(finished, tmp_path, capsys):
-    arguments = ("evaluate", finished, "--on", "sand,rigid", "--episodes", 2, "--baseline", "--json")
-    report = json.loads(call(capsys, *arguments, "--plot", tmp_path / "scores.png")[1])
-    assert [(one["ground"], one["actor"]) for one in report[str(finished)]] == [
-        (ground, actor) for ground in ("sand", "rigid") for actor in ("policy", "random", "open loop")
-    ]
-    assert (tmp_path / "scores.png").stat().st_size > 10_000
-    played = json.loads(call(capsys, "play", finished, "--seed", 10_001, "--json")[1])["episodes"][0]
-    scored = report[str(finished)][0]["episodes"][1]
-    assert scored["r"] == pytest.approx(played["r"], rel=1e-6)  # actions of a batch differ in their last bits
-    for one in report[str(finished)]:
-        assert one["ended_early"] == 0.0
-        assert one["which"].endswith("rad/s") == (one["actor"] == "open loop")
-
-
-def test_the_share_that_arrives_is_told_where_any_does():
-    one = {"r": 1.0, "early": 0.0, "reached": 1.0}
-    for episodes, told in (
-        ([one, one | {"reached": 0.0}], ["arrived [%]", "50"]),
-        ([one | {"reached": 0.0}], ["early [%]", "0"]),
-    ):
-        head, row = results._grid([evaluate.Score("sand", evaluate.POLICY, episodes)], False)
-        assert [head[-1], row[-1]] == told
-
-
-def test_several_runs_make_a_table_of_transfer(finished, tmp_path, capsys):
-    ppo.train(make_plan(TASK, SHORT | {"ground": "rigid"}, TINY), tmp_path / "rigid" / "seed-0")
-    code, out, _ = call(capsys, "evaluate", finished, tmp_path / "rigid", "--episodes", 1, "--markdown")
-    head, _, *rows = (line for line in out.splitlines() if line.startswith("|"))
-    assert code == 0
-    assert head == "| return | on sand | on rigid |"
-    assert ["trained on sand" in rows[0], "trained on rigid" in rows[1]] == [True, True]
-    assert f"    rftsim evaluate {finished} {tmp_path / 'rigid'} --episodes 1 --markdown" in out
-    code, _, err = call(capsys, "evaluate", finished, "--on", "mud")
-    assert (code, "grounds are as trained, sand" in " ".join(err.split())) == (2, True)
-    code, _, err = call(capsys, "evaluate", tmp_path / "nothing")
-    assert (code, "holds no training run" in " ".join(err.split())) == (2, True)
-
-
-def test_a_sand_that_a_law_cannot_have_is_left_out(finished, tmp_path, capsys):
-    """medium-sand has no density: of two runs the one whose law needs it has a dash there, and alone it is refused."""
-    ppo.train(make_plan(TASK, SHORT | {"law": "rft2d"}, TINY), tmp_path)
-    given = ("--on", "sand,medium-sand", "--episodes", 2, "--markdown")
-    code, out, _ = call(capsys, "evaluate", finished, tmp_path, *given)
-    first, second = (row.split("|")[2:4] for row in out.splitlines()[2:4])
-    assert code == 0
-    assert ([cell.strip() == "-" for cell in first], [cell.strip() == "-" for cell in second]) == (
-        [False, True],
-        [False, False],
-    )
-    code, _, err = call(capsys, "evaluate", finished, *given)
-    assert (code, "has no density" in " ".join(err.split())) == (2, True)
-
-
-def test_the_grid_has_each_ground_once():
-    found = evaluate.grid(make_plan(TASK))
-    assert "as trained" in found
-    assert "poppy-seeds" not in found  # that is what the runner is trained on
-    assert "medium-sand" not in found  # it has no density
-    assert "rigid" in found
-
-
-@pytest.mark.parametrize("name", tasks.TASKS)
-def test_drives_that_see_nothing_are_actions(name):
-    task = tasks.make(name, {})
-    env = SandEnv(name)
-    for drive in task.open_loops().values():
-        for time_ in (0.0, 1.23):
-            action = drive(time_)
-            assert action.shape == (env.task.naction,)
-            assert np.abs(action).max() <= 1.0
 
 
 @pytest.mark.slow
@@ -502,21 +323,6 @@ def test_a_refused_run_leaves_nothing(tmp_path, capsys, change):
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        (("--seed", -1), "seed zero or more"),
-        (("--seconds", "inf"), "seconds positive"),
-        (("--seconds", "nan"), "positive"),
-    ],
-)
-def test_episodes_that_cannot_be_played_are_refused(capsys, change, words):
-    code, out, err = call(capsys, "play", TASK, *change)
-    assert (code, out) == (2, "")
-    assert len(err.splitlines()) == 1
-    assert words in err
-
-
 def test_normalised_observations_are_kept_in_the_policy(tmp_path):
     """Mean and spread of all that was collected; a stopped run goes on with them, and its policy plays with them."""
     plan, calls = make_plan(TASK, SHORT, TINY | {"normalise": True}), []
@@ -539,34 +345,3 @@ def test_normalised_observations_are_kept_in_the_policy(tmp_path):
     observation, _ = env.reset(seed=0)
     action = PPO.load(tmp_path / "policy.zip", device="cpu").predict(observation, deterministic=True)[0]
     np.testing.assert_array_equal(actors.trained(Folder(tmp_path))(env.episodes)(observation[None], 0.0)[0], action)
-
-
-def test_a_policy_with_a_past_is_trained_and_scored(tmp_path, capsys):
-    plan = make_plan(TASK, SHORT | {"history": 3, "observe_ground": True}, TINY)
-    ppo.train(plan, tmp_path)
-    code, out, _ = call(capsys, "evaluate", tmp_path, "--episodes", 2, "--on", "sand,dunes", "--json")
-    assert (code, len(json.loads(out)[str(tmp_path)])) == (0, 2)
-
-
-@pytest.mark.slow
-def test_scores_on_ray_are_those_of_here(finished, capsys):
-    """`evaluate --ray` gives, ground by ground, the numbers of the same command without it."""
-    pytest.importorskip("ray")
-    arguments = ("evaluate", finished, "--on", "sand,rigid", "--episodes", 2, "--baseline", "--json")
-    code, out, _ = call(capsys, *arguments, "--ray", "local")
-    assert code == 0
-    assert json.loads(out) == json.loads(call(capsys, *arguments)[1])
-
-
-def test_a_run_is_watched_while_it_is_trained(tmp_path, capsys):
-    """After each update where no time has to pass: an episode of the policy, and at the end that of the final one."""
-    pytest.importorskip("rerun")
-    arguments = ["train", TASK, "--out", tmp_path, "--set", "duration=0.3", "--envs", 4, "--steps", 256]
-    arguments += ["--hyper", "n_steps=32", "batch_size=32", "n_epochs=1", "layers=8"]
-    assert call(capsys, *arguments, "--watch", 0)[0] == 0
-    assert [path.name for path in sorted((tmp_path / "watch").iterdir())] == ["000000128.rrd", "000000256.rrd"]
-    assert len(read(tmp_path / "watch/000000256.rrd", "/motion/speed")) == STEPS
-    code, _, err = call(capsys, *arguments, "--watch", -1)
-    assert (code, "watch takes seconds, zero or more" in err) == (2, True)
-    code, _, err = call(capsys, *arguments, "--watch", 1, "--ray", "local")
-    assert (code, "are not watched" in " ".join(err.split())) == (2, True)
