@@ -89,7 +89,9 @@ class GrouserWheel(Task):
     edge = 2 * GROUSER_WHEEL.width
     ncommand = 2
     naction = 1
-    training = Training(steps=150_000, n_envs=32, n_steps=64, batch_size=256, n_epochs=10, gamma=0.98)
+    training = Training(
+        steps=150_000, n_envs=32, n_steps=64, batch_size=1024, n_epochs=10, gamma=0.98, learning_rate=1e-3
+    )
     config: WheelConfig
 
     def options(self) -> dict[str, Any]:

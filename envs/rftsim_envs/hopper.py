@@ -75,7 +75,7 @@ class Hopper(Task):
     ncommand = 1
     naction = len(JOINTS)
     training = Training(
-        steps=600_000, n_steps=64, batch_size=256, n_epochs=10, learning_rate=5e-4, layers=(128, 128), log_std_init=-0.7
+        steps=600_000, n_steps=64, batch_size=512, n_epochs=10, learning_rate=8e-4, layers=(128, 128), log_std_init=-0.7
     )
     config: HopperConfig
 
