@@ -31,8 +31,6 @@ class LocomotionConfig(WalkingConfig):
         pose: Positions of joints in the pose, in place of the keyframe's: `*_HFE=0.4,*_KFE=-0.8` [rad or m].
         reach: Change of the targets of position servos for an action of 1: one for all, or one for each [rad or m].
         observe_feet: Let the observation end with the height of each foot's sole above the ground.
-        reduction: Error of a body's wrench, relative, up to which its surface is felt by fewer elements, see
-            `rftsim.add_sand`; with zero every triangle is felt.
     """
 
     sand: str = "medium-sand"
@@ -45,7 +43,6 @@ class LocomotionConfig(WalkingConfig):
     pose: tuple[str, ...] = ()
     reach: tuple[float, ...] = (0.35,)
     observe_feet: bool = False
-    reduction: float = 0.05
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -54,8 +51,6 @@ class LocomotionConfig(WalkingConfig):
                 "Locomotion needs a robot: model takes the path of its MJCF or URDF, as model=go1/scene.xml"
             )
         object.__setattr__(self, "model", str(Path(self.model).resolve()))
-        if not 0.0 <= self.reduction < 1.0:
-            raise ConfigError(f"reduction must be at least 0 and below 1, not {self.reduction:g}")
         if not self.reach or min(self.reach) <= 0.0:
             raise ConfigError(f"reach must be positive, one number or one for each actuator, not {self.reach}")
 
@@ -121,7 +116,7 @@ class Locomotion(Walking):
 
     def options(self) -> dict[str, Any]:
         """Geoms as MuJoCo collides with them, in as few elements as the sand needs."""
-        return {"meshes": "hull", "reduction": self.config.reduction}
+        return {**super().options(), "meshes": "hull"}
 
     def build(self) -> mujoco.MjSpec:
         """The robot alone, whose first keyframe is its pose."""

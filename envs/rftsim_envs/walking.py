@@ -2,7 +2,7 @@
 
 import abc
 import dataclasses
-from typing import Final
+from typing import Any, Final
 
 import mujoco
 import numpy as np
@@ -38,6 +38,8 @@ class WalkingConfig(Config):
         energy: Weight of the power in the reward.
         haste: Weight of the actions' changes in the reward.
         tilt: Weight of the base's lean in the reward.
+        reduction: Error of a body's wrench, relative, up to which its surface is felt by fewer elements, see
+            `rftsim.add_sand`; with zero every triangle is felt.
     """
 
     period: float = 0.04
@@ -54,6 +56,7 @@ class WalkingConfig(Config):
     energy: float = 0.2
     haste: float = 0.02
     tilt: float = 2.0
+    reduction: float = 0.05
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -64,6 +67,8 @@ class WalkingConfig(Config):
                     f"{name} must be a range within -{FASTEST:g} and {FASTEST:g}, low to high, not {(low, high)}"
                 )
         check_positive(self, ("spread", "turning_spread"), ConfigError)
+        if not 0.0 <= self.reduction < 1.0:
+            raise ConfigError(f"reduction must be at least 0 and below 1, not {self.reduction:g}")
 
 
 class Walking(Task):
@@ -102,6 +107,10 @@ class Walking(Task):
     def naction(self) -> int:
         """Number of actuators that are driven."""
         return len(self.driven)
+
+    def options(self) -> dict[str, Any]:
+        """Bodies felt by as few elements as the sand needs."""
+        return {"reduction": self.config.reduction}
 
     def prepare(self, model: mujoco.MjModel) -> None:
         """Look up the robot's weight, joints, actuators and standing pose in the compiled model."""
