@@ -43,12 +43,20 @@ DEAR = {
     "warp.txt": "rftsim bench warp",
     "warp-cases.txt": f"rftsim bench warp --cases {WARP_CASES}",
 }
-POLICIES = "out/train/quadruped-rigid out/train/quadruped-sand out/train/quadruped-sands"
-SANDS = "'sand,half as strong,twice as strong,dunes,poppy-seeds,glass-beads,medium-sand,rigid'"
+QUADRUPEDS = "out/train/quadruped-rigid out/train/quadruped-sand out/train/quadruped-sands"
+HOPPERS = "out/train/hopper-rigid out/train/hopper out/train/hopper-sands"
+ON_ALL = "'sand,half as strong,twice as strong,dunes,poppy-seeds,glass-beads,medium-sand,rigid'"
+NAMES = ("wheel", "runner", "hexapod", "hopper", "quadruped", "go1", "rover")
+ON_SANDS = "'sand,half as strong,twice as strong,slopes to 5 deg,dunes,poppy-seeds,glass-beads,medium-sand'"
 TRAINED = {
-    "transfer-quadruped.md": f"rftsim evaluate {POLICIES} --on {SANDS} --markdown",
-    "evaluate-quadruped.md": "rftsim evaluate out/train/quadruped-sands --markdown",
-    "evaluate-rover.md": "rftsim evaluate out/train/rover --markdown",
+    "evaluate-level.md": "rftsim evaluate out/train/wheel out/train/runner out/train/hexapod out/train/hopper "
+    "--on 'as trained' --baseline --markdown",
+    "evaluate-sands.md": f"rftsim evaluate {' '.join(f'out/train/{name}-sands' for name in NAMES)} "
+    f"--on {ON_SANDS} --markdown",
+    "evaluate-rover.md": "rftsim evaluate out/train/rover-sands --markdown",
+    "evaluate-go1.md": "rftsim evaluate out/train/go1 --baseline --markdown",
+    "transfer-hopper.md": f"rftsim evaluate {HOPPERS} --on {ON_ALL} --markdown",
+    "transfer-quadruped.md": f"rftsim evaluate {QUADRUPEDS} --on {ON_ALL} --markdown",
 }
 TABLES = CHEAP | DEAR | TRAINED
 RESULTS = (0, 1)

@@ -1,5 +1,6 @@
 """Simulations of one model side by side in mujoco_warp, on a GPU; of the extra `rftsim[warp]`."""
 
+import copy
 from collections.abc import Callable, Sequence
 from typing import Any, Final
 
@@ -40,7 +41,7 @@ class Worlds:
     """
 
     def __init__(self, model: mujoco.MjModel, n: int) -> None:
-        self.model, self.shown, self.n = model, model.__copy__(), n
+        self.model, self.shown, self.n = model, copy.copy(model), n
         self._beds = instances(model)
         self._sand = WarpSand(model, n) if self._beds else None
         plain = without_plugin(model)
@@ -54,11 +55,11 @@ class Worlds:
                 bed.vary(*PARAMETERS)
         self._fields: dict[str, Array] = {}
         self._settings: dict[str, Array] = {}
+        self._graphs: dict[int, Any] = {}
         for name in _WRITTEN:
             self.field(name)
         self._energy, self._failed = wp.zeros(n, dtype=float), np.zeros(n, dtype=bool)
         self._before = wp.zeros_like(self._d.qfrc_constraint)
-        self._graphs: dict[int, Any] = {}
 
     def field(self, name: str) -> Array:
         """A field of MjData, (n, ...), fetched after each control step and restart."""
@@ -80,6 +81,7 @@ class Worlds:
             if name != "numeric_data":  # mujoco_warp takes as many rows as there are, over and over
                 own = getattr(home, option)
                 setattr(home, option, wp.array(self._settings[name], dtype=own.dtype, device=own.device))
+                self._graphs.clear()
         return self._settings[name]
 
     def step(self, nstep: int) -> Array:
