@@ -52,7 +52,7 @@ class Train:
     set: Settings = ()
     """Of the task: ground=rigid strength=0.5,2."""
     hyper: Settings = ()
-    """Of PPO: learning_rate=1e-3 layers=128,128."""
+    """Of PPO: learning_rate=1e-3 layers=128,128; physics=warp on a GPU."""
     threads: Count = 0
     """Threads; 0 for one a processor."""
     tensorboard: Flag = False
