@@ -55,6 +55,7 @@ TRAINED = {
     f"--on {ON_SANDS} --markdown",
     "evaluate-rover.md": "rftsim evaluate out/train/rover-sands --markdown",
     "evaluate-go1.md": "rftsim evaluate out/train/go1 --baseline --markdown",
+    "evaluate-go1-sands.md": "rftsim evaluate out/train/go1-sands --markdown",
     "transfer-hopper.md": f"rftsim evaluate {HOPPERS} --on {ON_ALL} --markdown",
     "transfer-quadruped.md": f"rftsim evaluate {QUADRUPEDS} "
     "--on 'sand,half as strong,twice as strong,dunes,poppy-seeds,glass-beads,medium-sand,rigid' --markdown",
