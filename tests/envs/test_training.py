@@ -204,6 +204,15 @@ def test_a_full_disk_leaves_the_last_checkpoint_whole(tmp_path, capsys, monkeypa
     assert ppo.train(plan, tmp_path) == (500, 248, True)
 
 
+@pytest.fixture
+def interruptions():
+    """Ctrl-C as Python has it: a job in the background is begun without."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("interruptions")
 def test_ctrl_c_saves_and_says_how_to_go_on(tmp_path, capsys):
     arguments = ["train", TASK, "--out", tmp_path, "--set", "duration=0.3", "--envs", 4, "--hyper", "n_steps=32"]
 
