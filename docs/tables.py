@@ -43,22 +43,33 @@ DEAR = {
     "warp.txt": "rftsim bench warp",
     "warp-cases.txt": f"rftsim bench warp --cases {WARP_CASES}",
 }
-QUADRUPEDS = "out/train/quadruped-rigid out/train/quadruped-sand out/train/quadruped-sands"
-HOPPERS = "out/train/hopper-rigid out/train/hopper out/train/hopper-sands"
-ON_ALL = "'rigid,sand,half as strong,twice as strong,dunes,poppy-seeds,medium-sand'"
 NAMES = ("wheel", "runner", "hexapod", "hopper", "quadruped", "go1", "rover")
-ON_SANDS = "'half as strong,sand,twice as strong,dunes,poppy-seeds,medium-sand'"
+
+
+def _evaluate(*runs: str, more: str = "") -> str:
+    """The command that scores policies of docs/training.md."""
+    return f"rftsim evaluate {' '.join(f'out/train/{run}' for run in runs)}{more} --markdown"
+
+
+_SANDS = "half as strong,twice as strong,dunes,poppy-seeds"
 TRAINED = {
-    "evaluate-level.md": "rftsim evaluate out/train/wheel out/train/runner out/train/hexapod out/train/hopper "
-    "--on 'as trained' --baseline --markdown",
-    "evaluate-sands.md": f"rftsim evaluate {' '.join(f'out/train/{name}-sands' for name in NAMES)} "
-    f"--on {ON_SANDS} --markdown",
-    "evaluate-rover.md": "rftsim evaluate out/train/rover-sands --markdown",
-    "evaluate-go1.md": "rftsim evaluate out/train/go1 --baseline --markdown",
-    "evaluate-go1-sands.md": "rftsim evaluate out/train/go1-sands --markdown",
-    "transfer-hopper.md": f"rftsim evaluate {HOPPERS} --on {ON_ALL} --markdown",
-    "transfer-quadruped.md": f"rftsim evaluate {QUADRUPEDS} "
-    "--on 'sand,half as strong,twice as strong,dunes,poppy-seeds,glass-beads,medium-sand,rigid' --markdown",
+    "evaluate-level.md": _evaluate("wheel", "runner", "hexapod", "hopper", more=" --on 'as trained' --baseline"),
+    "evaluate-sands.md": _evaluate(
+        *(f"{name}-sands" for name in NAMES),
+        more=" --on 'half as strong,sand,twice as strong,dunes,poppy-seeds,medium-sand'",
+    ),
+    "evaluate-rover.md": _evaluate("rover-sands"),
+    "evaluate-go1.md": _evaluate("go1", more=" --baseline"),
+    "evaluate-go1-sands.md": _evaluate("go1-sands"),
+    "transfer-hopper.md": _evaluate(
+        "hopper-rigid", "hopper", "hopper-sands", more=f" --on 'rigid,sand,{_SANDS},medium-sand'"
+    ),
+    "transfer-quadruped.md": _evaluate(
+        "quadruped-rigid",
+        "quadruped-sand",
+        "quadruped-sands",
+        more=f" --on 'sand,{_SANDS},glass-beads,medium-sand,rigid'",
+    ),
 }
 TABLES = CHEAP | DEAR | TRAINED
 RESULTS = (0, 1)

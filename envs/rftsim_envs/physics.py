@@ -5,7 +5,7 @@ Both hand out the same arrays, whose first axis counts the simulations, and step
 
 import copy
 from collections.abc import Callable, Sequence
-from typing import Final, Protocol
+from typing import Any, Final, Protocol
 
 import mujoco
 import numpy as np
@@ -88,8 +88,7 @@ class One:
 
     def setting(self, name: str) -> Array:
         """A field of MjModel or an option as a view that writes to the model, (1, ...)."""
-        option = name.removeprefix("opt.")
-        view: Array = getattr(self.model if option == name else self.model.opt, option)[None]
+        view: Array = getattr(*home_of(self.model, name))[None]
         return view
 
     def step(self, nstep: int) -> Array:
@@ -163,6 +162,12 @@ class Many:
         self._batch.get_data(i, self._data)
         mujoco.mj_forward(self.shown, self._data)
         return self._data
+
+
+def home_of(model: Any, name: str) -> tuple[Any, str]:
+    """Where a field of a model, or an option as `opt.gravity`, lies, and its name there."""
+    option = name.removeprefix("opt.")
+    return (model, name) if option == name else (model.opt, option)
 
 
 def _mean_power(force: Array, rate: Array) -> Array:

@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable, Mapping
-from typing import Any, Final, Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -10,10 +10,8 @@ from rftsim.errors import RftsimError
 from rftsim_envs.physics import Array
 from rftsim_envs.settings import check_positive, convert_fields
 
-BATCH: Final = "batch"
-"""Name of MuJoCo's own batch of simulations, on threads."""
-WARP: Final = "warp"
-"""Name of mujoco_warp, on a GPU."""
+Stepper = Literal["batch", "warp"]
+"""What can step simulations: MuJoCo's own batch on threads, or mujoco_warp on a GPU."""
 Drive = Callable[[float], Array]
 """Controller that sees nothing: an action, (naction,), from the time since the episode's start [s]."""
 
@@ -75,7 +73,7 @@ class Training:
     log_std_init: float = -0.5
     normalise: bool = False
     start: str = ""
-    physics: Literal["batch", "warp"] = "batch"
+    physics: Stepper = "batch"
 
     def __post_init__(self) -> None:
         convert_fields(self, TrainingError)

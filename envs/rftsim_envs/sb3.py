@@ -12,7 +12,7 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvS
 from rftsim_envs import ground, tasks
 from rftsim_envs.env import Action, spaces
 from rftsim_envs.episodes import Episodes, Observation
-from rftsim_envs.recipe import BATCH
+from rftsim_envs.recipe import Stepper
 from rftsim_envs.simulations import side_by_side
 from rftsim_envs.tally import Tally
 from rftsim_envs.task import Task
@@ -42,7 +42,7 @@ class SandVecEnv(VecEnv):
     """
 
     def __init__(
-        self, task: "str | type[Task]", n_envs: int, threads: int = 0, physics: str = BATCH, **settings: Any
+        self, task: "str | type[Task]", n_envs: int, threads: int = 0, physics: Stepper = "batch", **settings: Any
     ) -> None:
         self.task = tasks.make(task, settings)
         self.config = self.task.config

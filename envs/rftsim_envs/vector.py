@@ -12,7 +12,7 @@ from rftsim_envs import ground, tasks
 from rftsim_envs.env import Action, spaces
 from rftsim_envs.episodes import Episodes, Observation
 from rftsim_envs.physics import Array, Flags
-from rftsim_envs.recipe import BATCH
+from rftsim_envs.recipe import Stepper
 from rftsim_envs.simulations import side_by_side
 from rftsim_envs.task import Task
 
@@ -38,7 +38,7 @@ class SandVectorEnv(VectorEnv[Observation, Action, NDArray[np.generic]]):
     metadata = {"autoreset_mode": AutoresetMode.SAME_STEP}  # noqa: RUF012, as Gymnasium has it
 
     def __init__(
-        self, task: "str | type[Task]", num_envs: int = 1, threads: int = 0, physics: str = BATCH, **settings: Any
+        self, task: "str | type[Task]", num_envs: int = 1, threads: int = 0, physics: Stepper = "batch", **settings: Any
     ) -> None:
         self.task, self.num_envs = tasks.make(task, settings), num_envs
         self.config = self.task.config

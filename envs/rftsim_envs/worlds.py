@@ -12,8 +12,8 @@ import warp as wp
 from rftsim.model.readout import Instance, instances
 from rftsim.warp.bed import PARAMETERS, WarpBed
 from rftsim.warp.power import add_power
-from rftsim.warp.sand import WarpSand, without_plugin
-from rftsim_envs.physics import Array, Flags
+from rftsim.warp.sand import put, without_plugin
+from rftsim_envs.physics import Array, Flags, home_of
 
 CONTACTS: Final = 64
 """Contacts that a simulation may have at once, in the mean."""
@@ -43,16 +43,16 @@ class Worlds:
     def __init__(self, model: mujoco.MjModel, n: int) -> None:
         self.model, self.shown, self.n = model, copy.copy(model), n
         self._beds = instances(model)
-        self._sand = WarpSand(model, n) if self._beds else None
-        plain = without_plugin(model)
-        self._initial, self._data = mujoco.MjData(plain), mujoco.MjData(self.shown)
-        mujoco.mj_forward(plain, self._initial)
-        self._m = mjw.put_model(plain)
-        self._d = mjw.put_data(plain, mujoco.MjData(plain), nworld=n, nconmax=CONTACTS, njmax=ROWS)
-        if self._sand is not None:
-            self._sand.attach(self._m)
+        sizes, self._sand = {"nworld": n, "nconmax": CONTACTS, "njmax": ROWS}, None
+        if self._beds:
+            self._m, self._d, self._sand, plain = put(model, **sizes)
             for bed in self._sand.beds:
                 bed.vary(*PARAMETERS)
+        else:
+            plain = without_plugin(model)
+            self._m, self._d = mjw.put_model(plain), mjw.put_data(plain, mujoco.MjData(plain), **sizes)
+        self._initial, self._data = mujoco.MjData(plain), mujoco.MjData(self.shown)
+        mujoco.mj_forward(plain, self._initial)
         self._fields: dict[str, Array] = {}
         self._settings: dict[str, Array] = {}
         self._graphs: dict[int, Any] = {}
@@ -74,11 +74,10 @@ class Worlds:
         Of `numeric_data` those of the sand's parameters count.
         """
         if name not in self._settings:
-            option = name.removeprefix("opt.")
-            home, ours = (self._m, self.model) if option == name else (self._m.opt, self.model.opt)
-            value = np.asarray(getattr(ours, option), dtype=float)
+            value = np.asarray(getattr(*home_of(self.model, name)), dtype=float)
             self._settings[name] = np.tile(value, (self.n,) + (1,) * value.ndim)
             if name != "numeric_data":  # mujoco_warp takes as many rows as there are, over and over
+                home, option = home_of(self._m, name)
                 own = getattr(home, option)
                 setattr(home, option, wp.array(self._settings[name], dtype=own.dtype, device=own.device))
                 self._graphs.clear()
@@ -119,8 +118,7 @@ class Worlds:
     def snapshot(self, i: int) -> mujoco.MjData:
         """Data of simulation i as MuJoCo's mj_forward has them, the engine plugin's sand included."""
         for name, values in self._settings.items():
-            option = name.removeprefix("opt.")
-            getattr(self.shown if option == name else self.shown.opt, option)[:] = values[i]
+            getattr(*home_of(self.shown, name))[:] = values[i]
         for name in _WRITTEN:
             getattr(self._data, name)[:] = self._fields[name][i]
         self._data.time = float(self._d.time.numpy()[i])
@@ -149,9 +147,7 @@ class Worlds:
                 for bed, own in zip(self._beds, self._sand.beds if self._sand else [], strict=True):
                     _send_bed(bed, own, values)
             else:
-                option = name.removeprefix("opt.")
-                own = getattr(self._m if option == name else self._m.opt, option)
-                own.assign(values.astype(np.float32))
+                getattr(*home_of(self._m, name)).assign(values.astype(np.float32))
 
     def _fetch(self, chosen: Flags) -> None:
         """Fetch the fields of the chosen simulations; of one that failed, since then, those of the initial state."""

@@ -7,9 +7,9 @@ import mujoco
 import numpy as np
 import pytest
 import trimesh
+from commands import call
 
 from rftsim import instances
-from rftsim.cli import main
 from rftsim.errors import RftsimError
 from rftsim.run import scenes
 
@@ -21,17 +21,6 @@ def sphere(tmp_path):
     path = tmp_path / "sphere.stl"
     trimesh.creation.icosphere(subdivisions=2, radius=0.05).export(path)
     return str(path)
-
-
-def call(capsys, *arguments):
-    """Exit code, standard output and standard error of one command."""
-    code = 0
-    try:
-        main([str(argument) for argument in arguments])
-    except SystemExit as end:
-        code = end.code
-    captured = capsys.readouterr()
-    return code, captured.out, captured.err
 
 
 def test_force_reports_what_it_promises(capsys, sphere):

@@ -7,11 +7,12 @@ import pytest
 
 pytest.importorskip("stable_baselines3")
 
+from commands import call
 from rftsim_envs import tasks
 from rftsim_envs.env import SandEnv
 from rftsim_envs.training import evaluate, ppo
 from rftsim_envs.training.folder import make_plan
-from short_runs import SHORT, TASK, TINY, call
+from short_runs import SHORT, TASK, TINY
 
 from rftsim.cli import evaluate as results
 

@@ -7,12 +7,13 @@ import pytest
 
 pytest.importorskip("stable_baselines3")
 
+from commands import call
 from rftsim_envs import watch
 from rftsim_envs.env import SandEnv
 from rftsim_envs.sb3 import SandVecEnv
 from rftsim_envs.training import actors
 from rftsim_envs.training.folder import Folder
-from short_runs import SHORT, STEPS, TASK, call
+from short_runs import SHORT, STEPS, TASK
 from stable_baselines3 import PPO
 
 import rftsim

@@ -4,10 +4,10 @@ import json
 import math
 from pathlib import Path
 
+import commands
 import numpy as np
 import pytest
 
-from rftsim.cli import main
 from rftsim.files import Kept
 from rftsim.validation import plates
 from rftsim.validation.cmu import PLATE_FILE, WHEEL_FILE
@@ -23,14 +23,8 @@ WHEEL_COLUMNS = (
 
 
 def call(capsys, *arguments):
-    """Exit code, standard output and standard error of one command."""
-    code = 0
-    try:
-        main(["validate", *map(str, arguments)])
-    except SystemExit as end:
-        code = end.code
-    captured = capsys.readouterr()
-    return code, captured.out, captured.err
+    """Exit code, standard output and standard error of `rftsim validate`."""
+    return commands.call(capsys, "validate", *arguments)
 
 
 @pytest.mark.parametrize(

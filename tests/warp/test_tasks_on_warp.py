@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from rftsim_envs import SandVectorEnv
 from rftsim_envs.physics import Array
-from rftsim_envs.recipe import BATCH, WARP, Training, TrainingError
+from rftsim_envs.recipe import Training, TrainingError
 from rftsim_envs.task import ConfigError
 
 from rftsim.errors import SceneError
 
 N = 3
+BATCH, WARP = "batch", "warp"
 TASK = "rftsim/CLegHexapod-v0"
 STEPS = 25
 
