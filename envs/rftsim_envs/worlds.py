@@ -59,7 +59,6 @@ class Worlds:
         for name in _WRITTEN:
             self.field(name)
         self._energy, self._failed = wp.zeros(n, dtype=float), np.zeros(n, dtype=bool)
-        self._before = wp.zeros_like(self._d.qfrc_constraint)
 
     def field(self, name: str) -> Array:
         """A field of MjData, (n, ...), fetched after each control step and restart."""
@@ -106,9 +105,10 @@ class Worlds:
         place()
         self._send(*_WRITTEN)
         self._send_settings()
-        wp.copy(self._before, self._d.qfrc_constraint)  # what the others' next step begins with
+        before = self._d.qfrc_constraint.numpy()  # what the others' next step begins with
+        before[mask] = 0.0
         mjw.forward(self._m, self._d)
-        wp.copy(self._d.qfrc_constraint, self._before)
+        self._d.qfrc_constraint.assign(before)
         self._fetch(mask)
 
     def failed(self) -> Flags:

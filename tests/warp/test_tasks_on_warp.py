@@ -63,6 +63,15 @@ def test_an_episode_that_begins_anew_leaves_the_others_alone() -> None:
         np.testing.assert_array_equal(once, again)
 
 
+def test_an_episode_knows_nothing_of_the_one_before() -> None:
+    """With the same seed all simulations go the same way again, bit for bit, whatever they did before."""
+    envs, ways = _made(WARP), []
+    for _ in range(2):
+        envs.reset(seed=3)
+        ways.append([envs.step(_steady(k))[0] for k in range(STEPS)])
+    np.testing.assert_array_equal(*ways)
+
+
 def test_episodes_end_and_begin_within_a_step() -> None:
     """After the last step of 0.1 s each simulation is at its start again, on another ground, and its end is told."""
     envs = _made(WARP, duration=0.1)
