@@ -41,6 +41,21 @@ print(json.dumps({"seconds": seconds, "heavy": sorted(heavy), "numbers": numbers
 """
 
 
+BARE = """
+import time
+import mujoco
+
+mujoco.MjModel.from_xml_string("<mujoco/>")
+print(time.process_time())
+"""
+
+
+def bare_start():
+    """Seconds of the processor that a fresh process takes for MuJoCo and an empty model, without sand."""
+    found = subprocess.run([sys.executable, "-c", BARE], capture_output=True, text=True, check=True)
+    return float(found.stdout)
+
+
 def first_force(folder, **environment):
     """What a fresh process prints that takes rftsim from a folder."""
     path = os.pathsep.join([str(folder), str(MODELS)])
@@ -92,14 +107,19 @@ def test_every_source_of_machine_code_counts():
 
 @pytest.mark.skipif(not link.takes_shipped(), reason="what ships is for another processor")
 def test_first_force_compiles_nothing(fresh):
-    """3 s of the processor in a fresh process with nothing cached, 1.5 s with Python's own cache; no cache of ours."""
+    """A first force costs at most 5 starts of MuJoCo, with Python's own cache or without; and it keeps no cache.
+
+    Bare starts of MuJoCo before and after are the measure, so that a slow machine is no failure.
+    """
     (fresh / "cache").mkdir()
+    before = bare_start()
     first = first_force(fresh, NUMBA_CACHE_DIR=str(fresh / "cache"))
     again = first_force(fresh, NUMBA_CACHE_DIR=str(fresh / "cache"))
     assert first["from"].startswith(str(fresh))
     assert first["heavy"] == []
-    assert first["seconds"] < 3.0
-    assert again["seconds"] < 1.5
+    bare = max(before, bare_start())
+    assert first["seconds"] < 5.0 * bare
+    assert again["seconds"] < 5.0 * bare
     assert not list((fresh / "cache").iterdir())
 
 
@@ -213,6 +233,6 @@ def test_compiled_here_it_is_the_same(fresh):
     assert len(kept) == len(PARTS)
     again = first_force(fresh)
     assert "numba" not in again["heavy"]
-    assert again["seconds"] < 3.0
+    assert again["seconds"] < 10.0 * bare_start()
     assert again["numbers"] == here["numbers"]
     np.testing.assert_allclose(here["numbers"], first_force(PACKAGE.parent)["numbers"], rtol=1e-9, atol=1e-12)
