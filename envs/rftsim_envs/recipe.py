@@ -53,7 +53,7 @@ class Training:
         normalise: Let the network see observations less their mean and over their standard deviation, which are learnt
             from all that was collected, and kept in the policy.
         start: Folder of a run whose policy is the first one, so that what it can do on easy ground need not be learnt
-            anew on hard ground; empty for a policy that can do nothing yet.
+            anew on hard ground; of several runs the one with the same seed. Empty for a policy that can do nothing yet.
         physics: What steps the simulations: `batch`, MuJoCo's own on threads, or `warp`, mujoco_warp on a GPU.
     """
 

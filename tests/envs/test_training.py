@@ -69,6 +69,21 @@ def test_a_run_starts_with_the_policy_of_another(finished, tmp_path):
     assert not (tmp_path / "other").exists()
 
 
+def test_each_seed_starts_with_the_policy_of_its_own_seed(finished, tmp_path):
+    """Where several runs lie in the folder to start from, each takes over the run that has its seed."""
+    (tmp_path / "before").mkdir()
+    (tmp_path / "before" / "seed-0").symlink_to(finished)
+    ppo.train(make_plan(TASK, SHORT, TINY, seed=1), tmp_path / "before" / "seed-1")
+    still = TINY | {"steps": 124, "learning_rate": 1e-30, "start": str(tmp_path / "before")}
+    for seed in (0, 1):
+        ppo.train(make_plan(TASK, SHORT, still, seed=seed), tmp_path / f"next-{seed}")
+        before = parameters(tmp_path / "before" / f"seed-{seed}" / "policy.zip")
+        after = parameters(tmp_path / f"next-{seed}" / "policy.zip")
+        assert all(np.allclose(before[name], after[name], rtol=0.0, atol=1e-12) for name in before)
+    with pytest.raises(TrainingError, match="has no policy yet"):
+        ppo.train(make_plan(TASK, SHORT, still, seed=2), tmp_path / "next-2")
+
+
 def test_a_stopped_run_goes_on_from_its_last_update(tmp_path):
     plan, calls = make_plan(TASK, SHORT, TINY), []
 

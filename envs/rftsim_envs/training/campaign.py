@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from rftsim_envs.recipe import TrainingError
-from rftsim_envs.training.folder import Folder, Plan, make_plan
+from rftsim_envs.training.folder import Folder, Plan, make_plan, of_seed
 from rftsim_envs.training.ppo import Trained, train
 from rftsim_envs.training.spread import spread
 
@@ -39,7 +39,7 @@ def make_plans(
         varied = dict(zip(vary, values, strict=True))
         group = ",".join(f"{key}={value}" for key, value in varied.items())
         for seed in seeds:
-            name = "/".join(filter(None, (re.sub(r"[^\w=,.+-]", "_", group), f"seed-{seed}")))
+            name = "/".join(filter(None, (re.sub(r"[^\w=,.+-]", "_", group), of_seed(seed))))
             if name in found:
                 raise TrainingError(f"two runs would share the folder {name}")
             found[name] = make_plan(env, {**settings, **varied}, changes, seed=seed, algo=algo)

@@ -103,6 +103,11 @@ def make_plan(
     return Plan(task=name, settings=dataclasses.asdict(task.config), training=training, seed=seed, algo=algo)
 
 
+def of_seed(seed: int) -> str:
+    """Name of the folder of one of several runs, that with this seed."""
+    return f"seed-{seed}"
+
+
 class Folder:
     """The folder of a training run, and the paths in it.
 

@@ -20,7 +20,7 @@ from stable_baselines3.common.utils import ConstantSchedule
 
 from rftsim_envs.recipe import Training, TrainingError
 from rftsim_envs.sb3 import SandVecEnv
-from rftsim_envs.training.folder import Folder, Plan, Progress, write_whole
+from rftsim_envs.training.folder import Folder, Plan, Progress, of_seed, write_whole
 from rftsim_envs.training.network import Normalising, network
 from rftsim_envs.training.weights import read_policy, take_over
 
@@ -85,7 +85,7 @@ def train(
     env = SandVecEnv(plan.task, training.n_envs, threads, training.physics, **plan.settings)
     model = make_model(training, env, plan.seed)  # what cannot be is refused before anything is written
     if training.start and not folder.checkpoint.is_file():
-        before = Folder(training.start)
+        before = _run_before(training.start, plan.seed)
         take_over(model.policy, read_policy(before), before)
     with folder.opened(plan):
         run = _Run(plan, env, model, folder, tensorboard)
@@ -96,6 +96,12 @@ def train(
             run.write(folder.policy, folder.checkpoint.read_bytes())
             folder.write_config(plan, done=True)
         return Trained(run.steps, began, done)
+
+
+def _run_before(start: str, seed: int) -> Folder:
+    """The run whose policy is the first one: of several with a seed each, the one that has this seed."""
+    alike = Path(start) / of_seed(seed)
+    return Folder(alike if alike.is_dir() else start)
 
 
 def make_model(training: Training, env: SandVecEnv, seed: int) -> PPO:
