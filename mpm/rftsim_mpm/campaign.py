@@ -29,6 +29,7 @@ from rftsim_mpm.output import replacing
 from rftsim_mpm.plate import Plate
 from rftsim_mpm.push import Push
 from rftsim_mpm.rut import Rut
+from rftsim_mpm.settings import settings_of
 from rftsim_mpm.simulation import Watch
 from rftsim_mpm.slope import Slope
 from rftsim_mpm.testbed import HeldWheel
@@ -61,7 +62,8 @@ MEASURES: dict[type[Job], Callable[[Any, Watch | None], Any]] = {
 MOST_JOBS = 100_000
 """Most jobs of one file."""
 DATA = Path(__file__).parent / "data"
-"""Campaigns that are shipped: `plates`, `flat`, `solids`, `deep`, `rates`, `wheels`, `slopes`, `ruts` and `held`."""
+"""Campaigns that are shipped: `plates`, `flat`, `solids`, `deep`, `rates`, `speeds`, `wheels`, `slopes`, `ruts`
+and `held`."""
 
 
 class Status(NamedTuple):
@@ -134,7 +136,7 @@ def _job(kind: type[Job], values: dict[str, Any], where: str) -> Job:
 
 def key(job: Job) -> str:
     """Return the name of a job's result: the beginning of the hash of everything that defines it."""
-    return hashlib.sha256(_canonical(dataclasses.asdict(job)).encode()).hexdigest()[:16]
+    return hashlib.sha256(_canonical(settings_of(job)).encode()).hexdigest()[:16]
 
 
 def _canonical(value: Any) -> str:
@@ -150,8 +152,7 @@ def begin(folder: Path, jobs: list[Job]) -> None:
     known = {key(job): job for job in (manifest(folder) if (folder / "manifest.json").exists() else [])}
     known |= {key(job): job for job in jobs}
     text = {
-        name: {own: dataclasses.asdict(job) for own, job in known.items() if type(job) is kind}
-        for name, kind in KINDS.items()
+        name: {own: settings_of(job) for own, job in known.items() if type(job) is kind} for name, kind in KINDS.items()
     }
     with replacing(folder / "manifest.json") as temporary:
         temporary.write_text(json.dumps({name: jobs for name, jobs in text.items() if jobs}, indent=1) + "\n")
@@ -193,7 +194,7 @@ def is_intact(path: Path, job: Job) -> bool:
     try:
         text = json.loads(path.read_text())
         checksum = text.pop("sha256")
-        return bool(checksum == _checksum(text) and text[_name(job)] == dataclasses.asdict(job))
+        return bool(checksum == _checksum(text) and text[_name(job)] == settings_of(job))
     except (OSError, ValueError, KeyError, AttributeError, TypeError, RecursionError):
         return False
 
@@ -216,7 +217,7 @@ def compute(job: Job, beat: Callable[[], None] | None = None) -> dict[str, Any]:
     """Compute the result of one job; `beat` is called at every step."""
     watch = None if beat is None else lambda sim, share: beat()
     found = MEASURES[type(job)](job, watch)
-    result = {_name(job): dataclasses.asdict(job), **found.report, **found.series}
+    result = {_name(job): settings_of(job), **found.report, **found.series}
     return {**result, "sha256": _checksum(result)}
 
 

@@ -63,6 +63,10 @@ class Course:
     """Acceleration, (dim,), or the strength of one along -z [m/s^2]."""
     wall_friction: Array | float = 0.0
     """Friction of the lower and upper wall across each axis, (dim, 2), or of all; infinite where sand sticks [-]."""
+    run_up: float = 0.0
+    """Travel in which the body evenly speeds up [m]."""
+    absorb: float = 0.0
+    """Width of the layers before the floor and those walls that are no mirrors in which waves die down [m]."""
 
     @property
     def level(self) -> float:
@@ -93,19 +97,35 @@ class Course:
         start[-1] -= self.approach * self.direction[-1]
         end = start[-1] + (self.approach + self.window) * self.direction[-1]
         top = max(self.level, start[-1] + reach[-1], end + reach[-1]) + reach.max() + 2.0 * dx
-        body = Body(self.shape, start, self.speed * self.direction, self.friction, self.rotation)
+        body = Body(
+            self.shape, start, (0.0 if self.run_up else self.speed) * self.direction, self.friction, self.rotation,
+            steer=self._steer if self.run_up else None,
+        )  # fmt: skip
         filled = (*(n * dx for n in width), self.level)
         bed = level_bed(self.material, filled, dx, gravity=self.gravity, ppc=self.ppc)
         dt = self.courant * dx / self.material.wave_speed
-        if not (self.approach + self.window) / self.speed <= MOST_STEPS * dt:
+        if not (self.approach + self.run_up + self.window) / self.speed <= MOST_STEPS * dt:
             raise MpmError(f"the way takes more than {MOST_STEPS:g} time steps of {dt:.3g} s: go faster, or less far")
         box = (*(n * dx for n in width), top)
         sim = Simulation(
             self.material, bed, dx, box, bodies=[body], dt=dt, xpic=self.xpic, calm=self.calm,
-            gravity=self.gravity, wall_friction=self.wall_friction,
+            gravity=self.gravity, wall_friction=self.wall_friction, absorb=self._layers,
         )  # fmt: skip
         sim.clear_bodies()
         return sim
+
+    @property
+    def _layers(self) -> Array:
+        """Widths of the layers in which waves die down, (dim, 2) [m]: none at a mirror, nor at the top."""
+        layers = np.full((self.shape.dim, 2), self.absorb)
+        layers[-1, 1] = 0.0
+        layers[:-1, 0][np.array(self.mirrors)] = 0.0
+        return layers
+
+    def _steer(self, time: float) -> tuple[Array, Array]:
+        """Velocity and spin of the body at a time [s]."""
+        speed = min(1.0, 0.5 * self.speed * time / self.run_up) * self.speed
+        return speed * self.direction, np.zeros(1 if self.shape.dim == 2 else 3)
 
     def run(self, watch: Watch | None = None) -> "Passage":
         """Move the body to a little beyond the reading.

@@ -17,6 +17,7 @@ from rftsim_mpm.errors import MpmError, check_not_negative, check_positive
 from rftsim_mpm.fields import Camera
 from rftsim_mpm.material import Material, stiffness
 from rftsim_mpm.reading import History, limit
+from rftsim_mpm.settings import later
 from rftsim_mpm.shapes import Surface, box, patches
 from rftsim_mpm.simulation import Simulation, Watch
 
@@ -71,6 +72,10 @@ class Plate:
     """Order of XPIC; 0 is FLIP."""
     symmetric: bool = True
     """In 3D, model half or a quarter if that serves."""
+    run_up: float = later(0.0)
+    """Travel in which it evenly speeds up [lengths]."""
+    absorb: float = later(0.0)
+    """Width of layers at floor and walls that absorb waves [lengths]."""
 
     def __post_init__(self) -> None:
         if self.dim not in (2, 3):
@@ -83,7 +88,7 @@ class Plate:
         check_positive(self, "thickness", "depth", "young")
         if not 4.0 <= self.cells <= 200.0:
             raise MpmError(f"cells must be in [4, 200], not {self.cells:g}")
-        check_not_negative(self, "mu_surf")
+        check_not_negative(self, "mu_surf", "run_up", "absorb")
         if not 0.0 <= self.early <= 2.0:
             raise MpmError(f"early must be in [0, 2] cells, not {self.early:g}")
         if self.ppc < 1 or self.xpic < 0:
@@ -226,6 +231,8 @@ def course(plate: Plate) -> Course:
         ppc=plate.ppc,
         xpic=plate.xpic,
         shift=tuple(plate.shift - face[: dim - 1] / plate.dx),
+        run_up=plate.run_up * size,
+        absorb=plate.absorb * size,
     )
 
 

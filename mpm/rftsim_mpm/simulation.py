@@ -6,7 +6,7 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from rftsim_mpm.bed import Particles
 from rftsim_mpm.body import Body
@@ -39,6 +39,10 @@ CALM_EVERY = 20
 """Steps between takings of what the grid does not see from the velocities."""
 CALM_ORDER = 6
 """Order of XPIC that tells what the grid does not see."""
+ABSORB_EVERY = 5
+"""Steps between takings from the velocities in layers that absorb waves."""
+ABSORBED = 3.0
+"""Logarithm of what a compression wave loses on its way through such a layer, once."""
 
 
 class _Kernels(NamedTuple):
@@ -72,6 +76,9 @@ class Simulation:
         calm: Time in which velocities that the grid does not see die down; 0 leaves them, as FLIP does [s]. They do no
             harm in sand that is pushed once, but in sand that goes on flowing they mix particles until some lie twice
             as dense as they know, and heaps are too small.
+        absorb: Width of the layer before the lower and the upper face across each axis in which waves that are shorter
+            than it die down, (dim, 2) [m]. What flows is slowed down there, too, so that it belongs where the sand
+            would hardly move; 0 for none.
     """
 
     def __init__(
@@ -88,6 +95,7 @@ class Simulation:
         xpic: int = 0,
         inset: float = INSET,
         calm: float = 0.0,
+        absorb: ArrayLike = 0.0,
     ) -> None:
         dim = particles.dim
         cells = [math.ceil(round(s / dx, 6)) for s in size]
@@ -112,6 +120,7 @@ class Simulation:
         self.moment = np.zeros((len(self.bodies), 1 if dim == 2 else 3))
         """Moment of the sand about each body's origin, (nbody, 1 or 3) [N m, in the plane N]."""
         self.xpic, self.calm = xpic, calm
+        self._absorb = np.array(np.broadcast_to(absorb, (dim, 2)), float)
         self._shape = np.array(cells) + 3
         self._low = np.zeros(dim)
         self._kernels = _kernels(dim)
@@ -154,6 +163,8 @@ class Simulation:
             self._filter(self.xpic)
         if self.calm and self.steps % CALM_EVERY == 0:
             self._filter(CALM_ORDER, min(1.0, CALM_EVERY * self.dt / self.calm))
+        if self._absorb.any() and self.steps % ABSORB_EVERY == 0:
+            self._damp()
         k.scatter(p.x, p.v, p.mass, p.volume, p.stress, *grid, self._grid)
         self._touch()
         k.step(self._grid, self._shape, self.gravity, self.dt, self.wall_friction, self._flow, self.wall_impulse)
@@ -179,6 +190,17 @@ class Simulation:
         for _ in range(order):
             self._kernels.project(p.x, p.mass, self._low, 1.0 / self.dx, self._shape, self._grid, rest)
         p.v -= rest if share == 1.0 else share * rest
+
+    def _damp(self) -> None:
+        """Take from the velocities in absorbing layers, by a rate that grows with the square of the way into them."""
+        p, wave = self.particles, self.material.wave_speed
+        for axis, widths in enumerate(self._absorb):
+            for side, width in enumerate(widths):
+                if width > 0.0:
+                    way = p.x[:, axis] if side == 0 else self.size[axis] - p.x[:, axis]
+                    inside = np.flatnonzero(way < width)
+                    rate = 3.0 * ABSORBED * wave / width * (1.0 - way[inside] / width) ** 2
+                    p.v[inside] *= np.exp(-ABSORB_EVERY * self.dt * rate)[:, None]
 
     def _touch(self) -> None:
         full = self.material.rho_c * self.dx**self.particles.dim

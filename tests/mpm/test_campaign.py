@@ -14,6 +14,7 @@ from rftsim_mpm.campaign import begin, key, manifest, read_jobs, results, run, r
 from rftsim_mpm.cli import main
 from rftsim_mpm.errors import MpmError
 from rftsim_mpm.plate import Plate
+from rftsim_mpm.settings import settings_of
 
 GRID = """
 [defaults]
@@ -38,6 +39,14 @@ def test_lists_are_the_axes_of_a_grid(file):
     assert [(plate.mu_int, plate.beta) for plate in plates] == [(0.4, 0.0), (0.4, 20.0), (0.4, 30.0)]
     assert all(plate.cells == 4.0 and isinstance(plate.cells, float) for plate in plates)
     assert len({key(plate) for plate in plates}) == 3
+
+
+def test_what_a_study_learns_later_leaves_its_old_results_valid():
+    """A plate with a later setting at its default has the key that plates had before there was that setting."""
+    old = {name: value for name, value in dataclasses.asdict(Plate()).items() if name not in ("run_up", "absorb")}
+    assert settings_of(Plate()) == old
+    assert settings_of(Plate(run_up=0.5)) == old | {"run_up": 0.5}
+    assert len({key(Plate()), key(Plate(run_up=0.5)), key(Plate(absorb=1.0))}) == 3
 
 
 def test_pushes_are_jobs_too(tmp_path):

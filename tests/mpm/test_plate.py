@@ -58,6 +58,21 @@ def test_a_quick_plate_pushes_back():
     assert (np.abs(stress[places[:, 1] > 0.007]) < 1.0).all(), "nothing presses on the top"
 
 
+def test_a_plate_speeds_up_evenly():
+    """v^2 = 2 a s over the run-up, and its speed from there on."""
+    way = course(Plate(dim=2, cells=5.0, bed=0.3, speed=1.0, run_up=0.2))
+    sim = way.prepare()
+    first = sim.bodies[0].position.copy()
+    speeds = []
+    for _ in range(900):
+        sim.step()
+        travel = np.linalg.norm(sim.bodies[0].position - first)
+        speeds.append((travel, np.linalg.norm(sim.bodies[0].velocity)))
+    travel, speed = np.array(speeds).T
+    assert travel[-1] > 1.2 * way.run_up
+    np.testing.assert_allclose(speed, np.sqrt(np.minimum(travel / way.run_up, 1.0)), atol=0.02)
+
+
 def test_the_force_never_falls_suddenly():
     """Within half a millimetre of travel it loses less than an eighth, once the bed has come to rest.
 

@@ -261,6 +261,28 @@ def test_noise_dies_down_in_a_resting_bed():
     assert left[0.0] > 50e-3
 
 
+def test_a_layer_absorbs_waves_that_are_shorter_than_it():
+    """Of a weak compression wave that is half as long, about a third comes back of what a wall sends back."""
+    size, back = (0.9, 0.2), 0.9 / SAND.wave_speed
+    returned = {}
+    for absorb in (0.0, 0.25):
+        flows = []
+        for push in (0.0, 1e-3):
+            bed = level_bed(SAND, size, 0.01)
+            sim = Simulation(SAND, bed, 0.01, box_over(size, 0.04), absorb=[[absorb, absorb], [0.0, 0.0]])
+            bed.v[:, 0] += push * np.exp(-(((bed.x[:, 0] - 0.45) / 0.03) ** 2))
+            middle = []
+            while sim.time < 1.1 * back:
+                sim.step()
+                if sim.time > 0.9 * back:
+                    near = np.abs(sim.particles.x[:, 0] - 0.45) < 0.05
+                    middle.append(sim.particles.v[near, 0].mean())
+            flows.append(np.array(middle))
+        returned[absorb] = np.abs(flows[1] - flows[0]).max()
+    assert returned[0.0] > 2.5e-4
+    assert returned[0.25] < 0.35 * returned[0.0]
+
+
 def test_what_cannot_be():
     bed, size = small_bed(2)
     with pytest.raises(MpmError, match="whole cells"):
