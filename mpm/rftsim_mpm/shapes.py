@@ -191,6 +191,37 @@ def disc(radius: float, sides: int = 48) -> Shape:
     return polygon(corner * np.column_stack([np.cos(angle), np.sin(angle)]), "cylinder")
 
 
+def drum(radius: float, width: float, sides: int = 48) -> Shape:
+    """Return a cylinder about the y axis, centred, of the cross-section of a circle of this radius [m].
+
+    Its triangles are about as long as wide, so that points all over it are not more than need be.
+    """
+    corner = float(np.linalg.norm(disc(radius, sides).vertices[0]))
+    side = 2.0 * corner * math.sin(np.pi / sides)
+    rings = corner * (1.0 - side / corner) ** np.arange(1, sides // 3)
+    ys = np.linspace(-0.5 * width, 0.5 * width, max(2, 1 + round(width / side)))
+    cap = [(r, -0.5 * width) for r in rings[::-1]]
+    profile = np.array([*cap, *((corner, y) for y in ys), *((r, -y) for r, y in cap[::-1])])
+    angles = 2.0 * np.pi * np.arange(sides) / sides
+    around = np.column_stack([np.cos(angles), np.zeros(sides), np.sin(angles)])
+    vertices = np.concatenate([r * around + [0.0, y, 0.0] for r, y in profile] + [[[0.0, y, 0.0]] for y in ys[[0, -1]]])
+    index = np.arange(sides)
+    after, last = np.roll(index, -1), sides * (len(profile) - 1)
+    strips = [
+        part + sides * k
+        for k in range(len(profile) - 1)
+        for part in (
+            np.column_stack([index, index + sides, after]),
+            np.column_stack([after, index + sides, after + sides]),
+        )
+    ]
+    ends = [
+        np.column_stack([index, after, np.full(sides, len(vertices) - 2)]),
+        np.column_stack([after + last, index + last, np.full(sides, len(vertices) - 1)]),
+    ]
+    return mesh(vertices, np.concatenate([*strips, *ends]), "cylinder")
+
+
 def extruded(shape: Shape, width: float) -> Shape:
     """Return the solid that a polygon sweeps along y, centred, as wide as given [m]."""
     ring = shape.vertices

@@ -73,6 +73,7 @@ class Simulation:
         dt: Time step; COURANT cells per wave if not given [s].
         xpic: Order of the velocity filter; 0 for FLIP. It acts on each step, so it damps.
         inset: How far inside a body's surface contact lies, see INSET [cells].
+        spacing: Distance between the points of a body's surface, see SPACING [cells].
         calm: Time in which velocities that the grid does not see die down; 0 leaves them, as FLIP does [s]. They do no
             harm in sand that is pushed once, but in sand that goes on flowing they mix particles until some lie twice
             as dense as they know, and heaps are too small.
@@ -94,6 +95,7 @@ class Simulation:
         dt: float | None = None,
         xpic: int = 0,
         inset: float = INSET,
+        spacing: float = SPACING,
         calm: float = 0.0,
         absorb: ArrayLike = 0.0,
     ) -> None:
@@ -127,7 +129,7 @@ class Simulation:
         nodes = int(np.prod(self._shape))
         self._grid, self._flow = np.zeros((nodes, ROW)), np.zeros((nodes, ROW))
         self.inset = inset * dx
-        self.surfaces = [body.shape.surface(SPACING * dx, self.inset) for body in self.bodies]
+        self.surfaces = [body.shape.surface(spacing * dx, self.inset) for body in self.bodies]
         """Surface of each body where it touches the sand, `inset` inside its own."""
         self.traction = [np.zeros_like(surface.points) for surface in self.surfaces]
         """Traction of each body on the sand at the last step, at its points and in its frame, (n, dim) [Pa]."""

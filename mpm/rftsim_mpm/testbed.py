@@ -14,13 +14,17 @@ from rftsim_mpm.fields import Frame
 from rftsim_mpm.follow import follow
 from rftsim_mpm.material import Material, stiffness
 from rftsim_mpm.reading import averaged
-from rftsim_mpm.simulation import Simulation, Watch
+from rftsim_mpm.settings import later
+from rftsim_mpm.shapes import Shape, drum, extruded
+from rftsim_mpm.simulation import SPACING, Simulation, Watch
 from rftsim_mpm.wheel import Wheel, omega_of, outline
 
 Array = NDArray[np.float64]
 
 TURN = 1.5
 """Contact lengths by which the rim of a held wheel turns; forces are read in the second half."""
+SPARSE = 0.5
+"""Distance between the points of a wheel in space [cells]: it has many, and more make no difference."""
 PITCHES = 20
 """Pitches of a wheel without grousers: turns of a twentieth are what its noise is told from."""
 
@@ -37,6 +41,8 @@ class HeldWheel(Wheel):
     """If held, place on the grid [cells]."""
     calm: float = 0.01
     """If held, as in `Simulation` [s]."""
+    dim: int = later(2)
+    """2: plane strain; 3: if held, half of a wheel as broad as `breadth`, and its image."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -45,6 +51,10 @@ class HeldWheel(Wheel):
             raise MpmError("a wheel is held at a slip and a sinkage: prescribe both, or neither")
         if self.shift not in (0.0, 0.5):
             raise MpmError(f"shift must be 0 or 0.5 cells, not {self.shift:g}")
+        if self.dim not in (2, 3):
+            raise MpmError(f"dim must be 2 or 3, not {self.dim}")
+        if not self.held and self.dim == 3:
+            raise MpmError("a free wheel is computed in the plane: prescribe slip and sinkage in space")
         if not self.held:
             return
         slip, sinkage = float(self.prescribed_slip or 0.0), float(self.prescribed_sinkage or 0.0)
@@ -73,7 +83,10 @@ class HeldWheel(Wheel):
 
 
 class Held(NamedTuple):
-    """Forces on a held wheel, means over the second half of the run, and the run itself; per metre of breadth."""
+    """Forces on a held wheel, means over the second half of the run, and the run itself; per metre of breadth.
+
+    In space they are those of the whole wheel over its breadth.
+    """
 
     means: tuple[float, float, float]
     """Load, upward [N/m]; drawbar, along the way [N/m]; torque against the spin [N]: of the sand on the wheel."""
@@ -113,7 +126,10 @@ def hold(study: HeldWheel, watch: Watch | None = None) -> Held:
         raise MpmError(f"half of {study.time:g} s must hold two pitches of {pitch:g} s: a longer duration, or more rpm")
     track = follow(_prepared(study), study.time, watch)
     way = math.copysign(1.0, study.rpm)
-    forces = np.column_stack([track.force[:, 0, 1], way * track.force[:, 0, 0], -way * track.moment[:, 0, 0]])
+    torque = track.moment[:, 0, 0 if study.dim == 2 else 1]
+    forces = np.column_stack([track.force[:, 0, -1], way * track.force[:, 0, 0], -way * torque])
+    if study.dim == 3:
+        forces *= 2.0 / study.breadth
     late = track.time >= study.time - count * pitch
     parts = np.array([part.mean(axis=0) for part in np.array_split(forces[late], count)])
     noise = parts.std(axis=0, ddof=1) / math.sqrt(count)
@@ -130,21 +146,40 @@ def _prepared(study: HeldWheel) -> Simulation:
     material = Material.of_density(
         study.mu_int, study.rho, stiffness(study.rho, study.gravity, 0.3 * outer, study.mu_int)
     )
-    bed = level_bed(material, (length, depth), dx, gravity=study.gravity)
     level = depth - study.shift * dx
-    _lower(bed, study.shift * dx)
     start = behind if omega >= 0.0 else length - behind
-    place = np.array([start + study.shift * dx, level + outer - float(study.prescribed_sinkage or 0.0)])
-    body = Body(outline(study), place, np.array([speed, 0.0]), study.mu_surf, spin=np.array([omega]))
+    place = (start + study.shift * dx, level + outer - float(study.prescribed_sinkage or 0.0))
+    if study.dim == 2:
+        shape, across, spin = outline(study), [], [omega]
+    else:
+        shape, spin = _solid(study), [0.0, omega, 0.0]
+        across = [math.ceil((0.5 * study.breadth + outer) / dx) * dx]
+    bed = level_bed(material, (length, *across, depth), dx, gravity=study.gravity)
+    _lower(bed, study.shift * dx)
+    still = [0.0] * len(across)
+    body = Body(
+        shape,
+        np.array([place[0], *still, place[1]]),
+        np.array([speed, *still, 0.0]),
+        study.mu_surf,
+        spin=np.array(spin),
+    )
+    friction = np.full((study.dim, 2), study.mu_int)
+    friction[1:-1, 0] = 0.0  # the plane of symmetry
     sim = Simulation(
-        material, bed, dx, (length, level + 3.0 * outer), bodies=[body], gravity=study.gravity,
-        wall_friction=study.mu_int, xpic=study.xpic, calm=study.calm,
+        material, bed, dx, (length, *across, level + 3.0 * outer), bodies=[body], gravity=study.gravity,
+        wall_friction=friction, xpic=study.xpic, calm=study.calm, spacing=SPACING if study.dim == 2 else SPARSE,
     )  # fmt: skip
     sim.clear_bodies()
     return sim
 
 
+def _solid(study: HeldWheel) -> Shape:
+    """The whole wheel, about the middle of its axle."""
+    return extruded(outline(study), study.breadth) if study.grousers else drum(study.radius, study.breadth)
+
+
 def _lower(bed: Particles, by: float) -> None:
     """Lower a bed by whole layers of particles [m], the lowest of which go."""
-    bed.x[:, 1] -= by
-    bed.select(bed.x[:, 1] > 0.0)
+    bed.x[:, -1] -= by
+    bed.select(bed.x[:, -1] > 0.0)

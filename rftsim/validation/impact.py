@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from rftsim.model.add_sand import add_sand
 from rftsim.sand.medium import Sand
+from rftsim.validation.plates import fit_terms
 from rftsim.validation.shipped import Results, outcome, shipped
 from rftsim.validation.study import Measured, Request, Row, near
 
@@ -43,8 +44,10 @@ STEP: Final = 5e-4
 """Time step of a fall [s]."""
 STILL: Final = 1e-4
 """Speed at which a sphere has stopped [m/s]."""
-SLOWEST: Final = 0.2
-"""Speed up to which a plate of the continuum is taken for slow [m/s]."""
+LAMBDA: Final = Sand(xi_n=1e6).lambda_
+"""Factor of the inertial term under which spheres fall [-]."""
+BAND: Final = 0.4
+"""How far from that the continuum's may be [-]."""
 
 
 def jobs(request: Request) -> dict[str, Callable[[], Any]]:
@@ -88,23 +91,123 @@ def drop(law: str, sand: Sand, height: float, diameter: float, density: float) -
 
 
 def _read(results: Results) -> list[dict[str, Any]]:
-    kept = ("beta", "gamma", "mu_int", "rho", "length", "speed", "cells", "bed", "softness")
+    kept = ("beta", "gamma", "mu_int", "rho", "length", "speed", "cells")
     return [{name: one["plate"][name] for name in kept} | {"force": one["force"]} for one in results]
+
+
+def rows(measured: Measured) -> list[Row]:
+    """The rows of lambda by the continuum's plates, and of the spheres' depths."""
+    return [*_plate_rows(outcome(measured, "speeds") or []), *_sphere_rows(measured)]
+
+
+def _plate_rows(plates: list[dict[str, Any]]) -> list[Row]:
+    found = inertia_of(plates)
+    table = []
+    for (beta, gamma, friction), by_cells in found.items():
+        what = f"continuum: λ of a plate, β {beta:g}°, γ {gamma:g}°, μ_int {friction:g}"
+        coarse, *finer = sorted(by_cells)
+        for cells in (coarse, *finer):
+            table.append(Row(f"{what}, {cells:g} cells", by_cells[cells], "our continuum"))
+        for cells in finer:
+            limit = by_cells[cells] + (by_cells[cells] - by_cells[coarse]) / (cells / coarse - 1.0)
+            table.append(near(f"{what}, limit", limit, LAMBDA, BAND, "drft3d's own λ"))
+    return table
+
+
+def inertia_of(plates: list[dict[str, Any]]) -> dict[tuple[float, float, float], dict[float, float]]:
+    """Fit lambda of F_n = F_0 + lambda rho A v_n^2, n along the normal of the face that leads.
+
+    Args:
+        plates: Plates as the continuum reports them, several speeds of each.
+
+    Returns:
+        For each (beta, gamma, mu_int) lambda by the number of cells to a plate.
+    """
+    found: dict[tuple[float, float, float], dict[float, float]] = {}
+    for which in sorted({(p["beta"], p["gamma"], p["mu_int"], p["cells"]) for p in plates}):
+        own = [p for p in plates if (p["beta"], p["gamma"], p["mu_int"], p["cells"]) == which]
+        beta, gamma = np.radians(which[:2])
+        normal, way = np.array([np.sin(beta), 0.0, -np.cos(beta)]), np.array([np.cos(gamma), 0.0, -np.sin(gamma)])
+        force = np.array([-np.dot(p["force"], normal) for p in own])
+        unit = np.array([p["rho"] * (p["length"] * p["speed"] * (way @ normal)) ** 2 for p in own])
+        _, inertia = fit_terms(np.ones(len(own)), unit, force)
+        found.setdefault(which[:3], {})[which[3]] = inertia
+    return found
+
+
+def _sphere_rows(measured: Measured) -> list[Row]:
+    table = []
+    for law in LAWS:
+        exponents, factor = law_of(_spheres(measured, law))
+        compared = law == LAWS[-1]
+        for (name, expected), got in zip(EXPONENTS.items(), exponents, strict=True):
+            what = f"{law}: exponent of a sphere's depth over {name}"
+            within = 0.15 * abs(expected) if compared else math.inf
+            table.append(near(what, float(got), expected, within, SOURCE))
+        what, within = f"{law}: a sphere's depth over the measured law, geometric mean", 0.25 if compared else math.inf
+        table.append(near(what, factor, 1.0, within, SOURCE))
+    return table
+
+
+def _spheres(measured: Measured, law: str) -> list[dict[str, float]]:
+    return [one for size in DIAMETERS for one in measured[f"{law}/{size:g}"]]
 
 
 def law_of(spheres: list[dict[str, float]]) -> tuple[Array, float]:
     """Fit the depth by a product of powers.
 
     Args:
-        spheres: Drops, of all laws' one.
+        spheres: Drops, all under one law.
 
     Returns:
         The exponents as EXPONENTS has them, (4,), and the geometric mean of the depth over the measured law [-].
     """
+    powers, depth = np.log(_bases(spheres)), np.log([one["depth"] for one in spheres])
+    found, *_ = np.linalg.lstsq(np.vstack([powers, np.ones(len(depth))]).T, depth, rcond=None)
+    return found[:4], float(np.exp((depth - np.log(measured_depth(spheres))).mean()))
+
+
+def _bases(spheres: list[dict[str, float]]) -> Array:
+    """What the powers of EXPONENTS are of, (4, n): total drop, diameter [m], ratio of densities, friction [-]."""
     height, size, density, friction, depth = (
         np.array([one[name] for one in spheres]) for name in ("height", "diameter", "density", "friction", "depth")
     )
-    powers = np.log([height + depth, size, density / BULK, friction])
-    found, *_ = np.linalg.lstsq(np.vstack([powers, np.ones(len(depth))]).T, np.log(depth), rcond=None)
-    measured = math.log(PREFACTOR) + np.array(list(EXPONENTS.values())) @ powers
-    return found[:4], float(np.exp((np.log(depth) - measured).mean()))
+    return np.array([height + depth, size, density / BULK, friction])
+
+
+def measured_depth(spheres: list[dict[str, float]]) -> Array:
+    """Depth that was measured at the total drop of each sphere, (n,) [m]."""
+    powers = np.array(list(EXPONENTS.values()))
+    found: Array = PREFACTOR * np.exp(powers @ np.log(_bases(spheres)))
+    return found
+
+
+def draw(measured: Measured, figure: Any) -> None:
+    """Draw the plates' stress over their speed, and the spheres' depth over the one that was measured."""
+    left, right = figure.subplots(1, 2)
+    plates = outcome(measured, "speeds") or []
+    kinds = sorted({(p["beta"], p["gamma"], p["mu_int"], p["cells"]) for p in plates})
+    for k, kind in enumerate(kinds):
+        own = sorted((p for p in plates if (p["beta"], p["gamma"], p["mu_int"], p["cells"]) == kind), key=_speed)
+        stress = [1e-3 * float(np.linalg.norm(p["force"])) / p["length"] ** 2 for p in own]
+        label = f"β {kind[0]:g}°, γ {kind[1]:g}°, μ {kind[2]:g}, {kind[3]:g} cells"
+        left.plot([p["speed"] ** 2 for p in own], stress, "o-", color=f"C{k % 10}", label=label)
+    left.set_xlabel("speed² [m²/s²]")
+    left.set_ylabel("force per area [kPa]")
+    left.set_title("plates in the continuum", fontsize=10)
+    for k, law in enumerate(LAWS):
+        spheres = _spheres(measured, law)
+        got = 1e3 * np.array([one["depth"] for one in spheres])
+        right.loglog(1e3 * measured_depth(spheres), got, ".", color=f"C{k}", label=law)
+    line = np.array(right.get_xlim())
+    right.loglog(line, line, "k--", linewidth=1, label=SOURCE)
+    right.set_xlabel("measured law of depth [mm]")
+    right.set_ylabel("depth under the law [mm]")
+    right.set_title("spheres dropped on sand", fontsize=10)
+    for axis in (left, right):
+        axis.grid(alpha=0.3)
+        axis.legend(fontsize=7)
+
+
+def _speed(plate: dict[str, Any]) -> float:
+    return float(plate["speed"])

@@ -11,7 +11,21 @@ import rftsim_models
 import rftsim
 from rftsim.errors import RftsimError
 from rftsim.files import Kept
-from rftsim.validation import continuum, drill, held, measured, motion, plates, runner, ruts, scaling, slopes, wheel
+from rftsim.validation import (
+    continuum,
+    drill,
+    held,
+    impact,
+    measured,
+    motion,
+    plates,
+    runner,
+    ruts,
+    scaling,
+    slopes,
+    smooth_wheel,
+    wheel,
+)
 from rftsim.validation.study import Measured, Request, Row, Study
 
 
@@ -32,12 +46,16 @@ STUDIES: Final = {
         "dynamic laws against plates at speed and wheels of the material point method", motion, (15.0, 4.8)
     ),
     "held": _study("a wheel held at slip and sinkage by the material point method", held, (15.0, 4.8)),
+    "smooth-wheel": _study(
+        "3D-RFT against a smooth wheel held by the material point method", smooth_wheel, (15.0, 4.8)
+    ),
+    "impact": _study("plates at speed by the material point method, and spheres dropped on sand", impact),
     "slope": _study("depth and up on slopes, against plates of the material point method", slopes, (15.0, 4.8)),
     "ruts": _study("prints, heaps and ruts against the material point method", ruts, (13.0, 9.0)),
 }
 """Every study by name."""
 
-SHARED: Final = ("balance", "cmu", "plates", "played", "pockets", "shipped", "terramechanics")
+SHARED: Final = ("balance", "cmu", "held", "plates", "played", "pockets", "shipped", "terramechanics")
 """Modules of this folder that the studies' modules compute with."""
 PRESENTATION: Final = ("cli", "bench", "validation", "view")
 """Folders that no study computes with, except for its own modules."""
