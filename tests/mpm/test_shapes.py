@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import trimesh
 from rftsim_mpm.errors import MpmError
-from rftsim_mpm.shapes import box, disc, extruded, mesh, polygon, wheel
+from rftsim_mpm.shapes import box, disc, drum, extruded, mesh, polygon, wheel
 from rftsim_mpm.silhouette import load_shape
 
 ELL = np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 1.0], [1.0, 1.0], [1.0, 3.0], [0.0, 3.0]])
@@ -19,6 +19,7 @@ ELL = np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 1.0], [1.0, 1.0], [1.0, 3.0], [0.0
     (disc(1.0, 96), math.pi, 2.0 * math.pi),
     (polygon(ELL), 5.0, 12.0),
     (extruded(polygon(ELL), 2.0), 10.0, 34.0),
+    (drum(1.0, 0.5), 0.5 * math.pi, 3.0 * math.pi),
 ])  # fmt: skip
 def test_content_and_surface(shape, content, around):
     """Area and circumference, or volume and surface; normals close up to nothing."""

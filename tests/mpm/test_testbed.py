@@ -32,10 +32,23 @@ def test_a_wheel_that_turns_the_other_way_feels_the_same(grousers):
     np.testing.assert_allclose(mirrored.means, found.means, rtol=1e-6)
 
 
+@pytest.mark.slow
+def test_a_wheel_in_space_feels_the_same_the_other_way():
+    """Mirrored, forces are the same within 2 % of the load: points on triangles are no mirror images."""
+    study = dataclasses.replace(QUICK, dim=3, radius=0.04, breadth=0.03, dx=0.01, duration=0.055)
+    found, mirrored = (np.array(hold(dataclasses.replace(study, rpm=rpm)).means) for rpm in (240.0, -240.0))
+    load, _, torque = found
+    assert load > 50.0
+    assert torque > 0.5
+    np.testing.assert_allclose(mirrored[:2], found[:2], atol=0.02 * load)
+    assert mirrored[2] == pytest.approx(torque, rel=0.05)
+
+
 @pytest.mark.parametrize(
     ("bad", "said"),
     [({"prescribed_sinkage": None}, "prescribe both"), ({"shift": 0.3}, "shift"), ({"prescribed_slip": 1.5}, "slip"),
-     ({"prescribed_sinkage": 0.06}, "sinkage"), ({"grousers": 1}, "grousers"), ({"calm": -1.0}, "calm")],
+     ({"prescribed_sinkage": 0.06}, "sinkage"), ({"grousers": 1}, "grousers"), ({"calm": -1.0}, "calm"),
+     ({"dim": 4}, "dim"), ({"dim": 3, "prescribed_slip": None, "prescribed_sinkage": None}, "a free wheel")],
 )  # fmt: skip
 def test_wheels_that_cannot_be_held(bad, said):
     with pytest.raises(MpmError, match=said):
