@@ -1,7 +1,7 @@
-"""The laws against a wheel that the continuum holds at a slip and a sinkage: load, drawbar and torque over the slip.
+"""The laws against a wheel that the continuum holds at a slip: at a sinkage, or free to sink under its load.
 
-Computes no continuum: reads the campaign `held` of `rftsim_mpm/data`, which says by what command it was made. How far
-that has converged is told beside it, by its cells and its place on the grid.
+Computes no continuum: reads the campaigns `held` and `loaded` of `rftsim_mpm/data`, which say by what commands they
+were made. How far these have converged is told beside them, by their cells and places on the grid.
 """
 
 import dataclasses
@@ -27,6 +27,10 @@ SLIPS: Final = (-0.2, 0.0, 0.1, 0.2, 0.3, 0.4, 0.6, 0.8)
 """Slips of the shipped wheels [-]."""
 SINKAGE: Final = 0.03
 """Sinkage at which the slip is varied [m]."""
+LOADED_SLIPS: Final = (0.0, 0.1, 0.2, 0.3, 0.4, 0.6)
+"""Slips of the shipped wheels that sink under their load [-]."""
+LOAD: Final = 6.3 * 9.81 / 0.14
+"""That load, per metre of breadth [N/m]."""
 RATE: Final = math.pi
 """Angular velocity of the wheels, 30 turns a minute [rad/s]."""
 NOTE: Final = "no exact limit load without dilatancy, and means wander"
@@ -43,8 +47,9 @@ CONVERGED: Final = 0.05
 
 def jobs(request: Request) -> dict[str, Callable[[], Any]]:
     """The job that reads what is shipped, and one for each law and slip."""
-    laws = {f"{law}/{slip:g}": functools.partial(_law, law, slip) for law in LAWS for slip in SLIPS}
-    return shipped("held", _read) | laws
+    laws = {f"{law}/{slip:g}": functools.partial(_law, law, slip, SINKAGE) for law in LAWS for slip in SLIPS}
+    under = {f"loaded {law}/{slip:g}": functools.partial(_at_load, law, slip) for law in LAWS for slip in LOADED_SLIPS}
+    return shipped("held", _read) | shipped("loaded", _read_loaded) | laws | under
 
 
 def _read(results: Results) -> list[dict[str, float]]:
@@ -53,8 +58,25 @@ def _read(results: Results) -> list[dict[str, float]]:
     return [{n: one["heldwheel"][n] for n in kept} | {n: one[n] for n in names} for one in results]
 
 
-def _law(law: str, slip: float) -> dict[str, float]:
-    """The forces that a law gives on the wheel at a slip, a third of its grousers' height felt."""
+def _read_loaded(results: Results) -> list[dict[str, float]]:
+    names = ("sinkage_m", "drawbar_N_m", "torque_N", "sinking_m")
+    return [
+        {n: one["heldwheel"][n] for n in ("prescribed_slip", "dx")} | {n: one[n] for n in names}
+        for one in sorted(results, key=lambda one: (-one["heldwheel"]["dx"], one["heldwheel"]["prescribed_slip"]))
+    ]
+
+
+def _at_load(law: str, slip: float) -> dict[str, float]:
+    """The sinkage at which a law bears the wheel's load at a slip, and the forces there."""
+    low, high = 0.0, GROUSER_WHEEL.outer_radius
+    for _ in range(20):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if _law(law, slip, middle)["load_N_m"] < LOAD else (low, middle)
+    return {"sinkage_m": high, **_law(law, slip, high)}
+
+
+def _law(law: str, slip: float, sinkage: float) -> dict[str, float]:
+    """The forces that a law gives on the wheel at a slip and a sinkage, a third of its grousers' height felt."""
     own = GROUSER_WHEEL
     wheel = Grousers(own.radius, own.outer_radius, own.width, own.lugs, own.lug_width)
     surface = wheel.with_height(own.felt_height).surface
@@ -63,7 +85,7 @@ def _law(law: str, slip: float) -> dict[str, float]:
     for phase in wheel.pitch * np.arange(PHASES) / PHASES:
         c, s = math.cos(phase), math.sin(phase)
         found = surface_force(
-            surface, POPPY, law, position=(0.0, 0.0, own.outer_radius - SINKAGE),
+            surface, POPPY, law, position=(0.0, 0.0, own.outer_radius - sinkage),
             rotation=[[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]],
             velocity=((1.0 - slip) * RATE * own.outer_radius, 0.0, 0.0), angular_velocity=(0.0, RATE, 0.0),
         )  # fmt: skip
@@ -74,7 +96,7 @@ def _law(law: str, slip: float) -> dict[str, float]:
 def rows(measured: Measured) -> list[Row]:
     """The rows of the laws against the continuum, and of the continuum against finer cells of its own."""
     table = outcome(measured, "held") or []
-    return [*_law_rows(measured, table), *_cell_rows(table)]
+    return [*_law_rows(measured, table), *_cell_rows(table), *_loaded_rows(measured)]
 
 
 def _over_slip(table: list[dict[str, float]]) -> list[dict[str, float]]:
@@ -90,6 +112,24 @@ def _law_rows(measured: Measured, table: list[dict[str, float]]) -> list[Row]:
         for one in _over_slip(table)
         for said, got, expected, unit, _ in _compared(measured[f"{law}/{one['prescribed_slip']:g}"], one)
     ]
+
+
+def _loaded_rows(measured: Measured) -> list[Row]:
+    """The rows of the dynamic law over the slip at a load, to be read, and of the continuum's finer cells."""
+    table = outcome(measured, "loaded") or []
+    coarse = {one["prescribed_slip"]: one for one in table if one["dx"] == CELL}
+    rows = []
+    for one in table:
+        slip = one["prescribed_slip"]
+        if one["dx"] == CELL:
+            what, found, expected, source = LAWS[-1], measured[f"loaded {LAWS[-1]}/{slip:g}"], one, "our continuum"
+        else:
+            what, found, expected, source = f"continuum, {1e3 * one['dx']:g} mm", one, coarse[slip], "itself at 4 mm"
+        note = f"it sinks by {1e3 * one['sinking_m']:.1f} mm in the time of the means"
+        for name, unit, factor in (("sinkage_m", "mm", 1e3), ("drawbar_N_m", "N/m", 1.0), ("torque_N", "N", 1.0)):
+            said = f"{what}, under its load, slip {slip:g}: {name.partition('_')[0]}"
+            rows.append(Row(said, factor * found[name], source, unit, expected=factor * expected[name], note=note))
+    return rows
 
 
 def _cell_rows(table: list[dict[str, float]]) -> list[Row]:
@@ -126,11 +166,22 @@ def _pairs(own: list[dict[str, float]]) -> list[tuple[dict[str, float], dict[str
 
 
 def draw(measured: Measured, figure: Any) -> None:
-    """Draw load, drawbar and torque over the slip, of the continuum with its finer cells and of the laws."""
+    """Draw load, drawbar and torque over the slip at a sinkage, and sinkage, drawbar and torque at a load."""
+    axes = figure.subplots(2, 3)
+    _draw_held(measured, axes[0])
+    _draw_loaded(measured, axes[1])
+    for axis in axes.flat:
+        axis.set_xlabel("slip  $1 - v/(R\\omega)$ [-]")
+        axis.grid(alpha=0.3)
+        axis.legend(fontsize=7)
+    figure.suptitle(f"Grousered wheel, 30 RPM: held {1e3 * SINKAGE:g} mm deep, and under {LOAD:.0f} N/m")
+
+
+def _draw_held(measured: Measured, axes: Any) -> None:
     table = outcome(measured, "held") or []
     coarse = _over_slip(table)
     names = ("load [N/m]", "drawbar [N/m]", "torque [N]")
-    for axis, name, said in zip(figure.subplots(1, 3), FORCES, names, strict=True):
+    for axis, name, said in zip(axes, FORCES, names, strict=True):
         if coarse:
             slip, force, noise = (
                 [one[column] for one in coarse] for column in ("prescribed_slip", name, f"{name}_noise")
@@ -141,8 +192,17 @@ def draw(measured: Measured, figure: Any) -> None:
             axis.plot(one["prescribed_slip"], one[name], f"C3{mark}", label=f"{1e3 * one['dx']:.3g} mm")
         for law, line in zip(LAWS, ("--", "-"), strict=True):
             axis.plot(SLIPS, [measured[f"{law}/{slip:g}"][name] for slip in SLIPS], f"C0{line}", label=law)
-        axis.set_xlabel("slip  $1 - v/(R\\omega)$ [-]")
         axis.set_ylabel(said)
-        axis.grid(alpha=0.3)
-        axis.legend(fontsize=7)
-    figure.suptitle(f"Grousered wheel held {1e3 * SINKAGE:g} mm deep, 30 RPM")
+
+
+def _draw_loaded(measured: Measured, axes: Any) -> None:
+    table = outcome(measured, "loaded") or []
+    names = {"sinkage_m": "sinkage [m]", "drawbar_N_m": "drawbar [N/m]", "torque_N": "torque [N]"}
+    for axis, (name, said) in zip(axes, names.items(), strict=True):
+        for dx, mark in zip(sorted({one["dx"] for one in table}, reverse=True), ("ko", "C3v"), strict=False):
+            points = [(one["prescribed_slip"], one[name]) for one in table if one["dx"] == dx]
+            axis.plot(*np.array(points).T, mark, label=f"continuum, cells {1e3 * dx:.3g} mm")
+        for law, line in zip(LAWS, ("--", "-"), strict=True):
+            curve = [measured[f"loaded {law}/{slip:g}"][name] for slip in LOADED_SLIPS]
+            axis.plot(LOADED_SLIPS, curve, f"C0{line}", label=law)
+        axis.set_ylabel(said)

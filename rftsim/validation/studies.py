@@ -45,7 +45,7 @@ STUDIES: Final = {
     "motion": _study(
         "dynamic laws against plates at speed and wheels of the material point method", motion, (15.0, 4.8)
     ),
-    "held": _study("a wheel held at slip and sinkage by the material point method", held, (15.0, 4.8)),
+    "held": _study("a wheel held at a slip by the material point method", held, (15.0, 9.0)),
     "smooth-wheel": _study(
         "3D-RFT against a smooth wheel held by the material point method", smooth_wheel, (15.0, 4.8)
     ),

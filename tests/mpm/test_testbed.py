@@ -19,7 +19,9 @@ def test_a_held_wheel_moves_as_prescribed():
     np.testing.assert_allclose(way[:, 0] / way[:, 0].mean(), 1.0, atol=1e-9)
     assert way[:, 0].mean() / step == pytest.approx(0.7 * 4.0 * np.pi * 0.094, rel=0.01)
     np.testing.assert_allclose(way[:, 1], 0.0, atol=1e-15)
-    load, _, torque = found.means
+    load, _, torque, sinkage = found.means
+    assert sinkage == pytest.approx(0.02, abs=1e-9)
+    assert found.sinking == pytest.approx(0.0, abs=1e-9)
     assert load > 50.0
     assert torque > 0.0
 
@@ -32,12 +34,22 @@ def test_a_wheel_that_turns_the_other_way_feels_the_same(grousers):
     np.testing.assert_allclose(mirrored.means, found.means, rtol=1e-6)
 
 
+def test_a_wheel_under_its_load_sinks_until_the_sand_bears_it():
+    """The load comes to m g over the breadth, at a sinkage that hardly grows any more."""
+    study = dataclasses.replace(QUICK, prescribed_sinkage=None, duration=0.5)
+    found = hold(study)
+    assert found.means[0] == pytest.approx(study.mass_z * study.gravity / study.breadth, rel=0.03)
+    assert 0.01 < found.means[3] < 0.06
+    assert abs(found.sinking) < 0.2 * found.means[3]
+    assert found.sinkages[0] == pytest.approx(0.006, abs=1e-3)
+
+
 @pytest.mark.slow
 def test_a_wheel_in_space_feels_the_same_the_other_way():
     """Mirrored, forces are the same within 2 % of the load: points on triangles are no mirror images."""
     study = dataclasses.replace(QUICK, dim=3, radius=0.04, breadth=0.03, dx=0.01, duration=0.055)
     found, mirrored = (np.array(hold(dataclasses.replace(study, rpm=rpm)).means) for rpm in (240.0, -240.0))
-    load, _, torque = found
+    load, _, torque, _ = found
     assert load > 50.0
     assert torque > 0.5
     np.testing.assert_allclose(mirrored[:2], found[:2], atol=0.02 * load)
@@ -46,7 +58,8 @@ def test_a_wheel_in_space_feels_the_same_the_other_way():
 
 @pytest.mark.parametrize(
     ("bad", "said"),
-    [({"prescribed_sinkage": None}, "prescribe both"), ({"shift": 0.3}, "shift"), ({"prescribed_slip": 1.5}, "slip"),
+    [({"prescribed_slip": None}, "prescribed_slip is missing"), ({"shift": 0.3}, "shift"),
+     ({"prescribed_slip": 1.5}, "slip"),
      ({"prescribed_sinkage": 0.06}, "sinkage"), ({"grousers": 1}, "grousers"), ({"calm": -1.0}, "calm"),
      ({"dim": 4}, "dim"), ({"dim": 3, "prescribed_slip": None, "prescribed_sinkage": None}, "a free wheel")],
 )  # fmt: skip
@@ -74,7 +87,7 @@ def test_a_held_wheel_in_weak_sand_has_converged(grousers, sinkage, others):
     The disc's change by 5 and 7 %; `data/held` goes on to 1.33 mm, and to stronger sand, which has no such limit.
     """
     study = HeldWheel(grousers=grousers, prescribed_slip=0.3, prescribed_sinkage=sinkage, mu_int=0.4, dx=0.002)
-    load, _, torque = hold(study).means
+    load, _, torque, _ = hold(study).means
     for other in others:
         found = hold(dataclasses.replace(study, **other)).means
         assert (found[0], found[2]) == pytest.approx((load, torque), rel=0.05)

@@ -56,7 +56,7 @@ class DragCommand(StudyCommand[Drag, DragForces]):
 
 
 class WheelCommand(StudyCommand[HeldWheel, Rolling | Held]):
-    """Let a driven grousered wheel travel and sink, or hold it at a slip and a sinkage and read the forces on it.
+    """Let a driven grousered wheel travel and sink, or hold it at a slip, and a sinkage, and read the forces on it.
 
     Example: rftsim-mpm wheel --rpm 60 --plot wheel.png
     """
@@ -76,8 +76,10 @@ class WheelCommand(StudyCommand[HeldWheel, Rolling | Held]):
 
     def _lines(self, study: HeldWheel, found: Rolling | Held) -> list[str]:
         if isinstance(found, Held):
-            loads = zip(("load", "drawbar", "torque"), found.means, found.noise, ("N/m", "N/m", "N"), strict=True)
-            return [f"{name} {mean:.4g} ± {noise:.2g} {unit}" for name, mean, noise, unit in loads]
+            names, units = ("load", "drawbar", "torque", "sinkage"), ("N/m", "N/m", "N", "m")
+            loads = zip(names, found.means, found.noise, units, strict=True)
+            lines = [f"{name} {mean:.4g} ± {noise:.2g} {unit}" for name, mean, noise, unit in loads]
+            return [*lines, f"over that time it sinks by {1e3 * found.sinking:.1f} mm"] if study.sinks else lines
         scaled = found.speed / _unit_speed(study)
         return [
             f"{study.rpm:g} RPM: {found.speed:.4f} m/s, {scaled:.3f} sqrt(g l), slip {found.slip:.3f}; "
