@@ -21,7 +21,10 @@ COLUMNS = "100"
 """Width that the commands print for."""
 WARP_CASES = "'heavy sphere' 'rolling wheel' 'legs, broken away' 'edge-on drag' drill re-entry slope weld"
 """Hard cases that the page on Warp shows."""
-STUDIES = ("wheel", "runner", "plates", "measured", "scaling", "drill", "continuum", "motion", "held", "slope", "ruts")
+STUDIES = (
+    *("wheel", "runner", "plates", "measured", "scaling", "drill", "continuum"),
+    *("motion", "held", "smooth-wheel", "impact", "slope", "ruts"),
+)
 CHEAP = {
     "help-rftsim.txt": "rftsim --help",
     "help-run.txt": "rftsim run --help",

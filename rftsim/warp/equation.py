@@ -123,13 +123,26 @@ def sum_smooth(
     applied: wp.array2d(dtype=float),
     bias: wp.array2d(dtype=float),
     constraint: wp.array2d(dtype=float),
+    is_new: wp.array(dtype=bool),
     out: wp.array2d(dtype=float),
 ):
-    """Fill out with all forces of a step but the sand's; the constraints' are those of the last, over (nworld, nv)."""
+    """Fill out with all forces of a step but the sand's, over (nworld, nv).
+
+    The constraints' are those of the last step, which a world that was reset has not made.
+    """
     world, dof = wp.tid()
-    out[world, dof] = (
-        passive[world, dof] + actuator[world, dof] + applied[world, dof] - bias[world, dof] + constraint[world, dof]
-    )
+    total = passive[world, dof] + actuator[world, dof] + applied[world, dof] - bias[world, dof]
+    if not is_new[world]:
+        total += constraint[world, dof]
+    out[world, dof] = total
+
+
+@wp.kernel(enable_backward=False)
+def mark_new(reset: wp.array(dtype=bool), is_new: wp.array(dtype=bool)):
+    """Mark the worlds that are reset, over (nworld,)."""
+    world = wp.tid()
+    if reset[world]:
+        is_new[world] = True
 
 
 @wp.kernel(enable_backward=False)

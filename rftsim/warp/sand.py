@@ -66,6 +66,7 @@ class WarpSand:
         self._damped, self._matrix = (wp.zeros((nworld, model.nC), dtype=float) for _ in range(2))
         blocks = io.m_block_layout(model)
         sizes = blocks["total"] + (model.nC if blocks["has_sparse"] else 0), model.nv
+        self._is_new = wp.ones(nworld, dtype=bool)
         self._factors = [wp.zeros((nworld, size), dtype=float) for size in sizes]
 
     def attach(self, m: Any) -> None:
@@ -108,8 +109,9 @@ class WarpSand:
         forward.fwd_actuation(m, d)
         smooth.rne(m, d)
         smooth.tendon_bias(m, d, d.qfrc_bias)
-        given = [d.qfrc_passive, d.qfrc_actuator, d.qfrc_applied, d.qfrc_bias, d.qfrc_constraint]
+        given = [d.qfrc_passive, d.qfrc_actuator, d.qfrc_applied, d.qfrc_bias, d.qfrc_constraint, self._is_new]
         wp.launch(equation.sum_smooth, dim=self._smooth.shape, inputs=given, outputs=[self._smooth])
+        self._is_new.zero_()
         support.xfrc_accumulate(m, d, self._smooth)
         if m.opt.integrator == mjw.IntegratorType.EULER:
             wp.copy(self._damped, d.M)
@@ -174,6 +176,7 @@ class WarpSand:
             reset: Which worlds, (nworld,) of bool; all unless given.
         """
         which = wp.ones(self.nworld, dtype=bool) if reset is None else reset
+        wp.launch(equation.mark_new, dim=self.nworld, inputs=[which], outputs=[self._is_new])
         for bed in self.beds:
             bed.forget(which)
 

@@ -132,6 +132,27 @@ def test_reset_on_warp_forgets() -> None:
     assert np.abs(again[1] - first[1]).max() < 1e-6
 
 
+def test_reset_on_warp_forgets_the_constraints() -> None:
+    """Their force in the last step, which mujoco_warp's reset leaves, is no part of the first guess of a new world."""
+    spec = mujoco.MjSpec.from_string(
+        '<mujoco><worldbody><body name="ball" pos="0 0 0.045"><joint type="slide" axis="0 0 1" frictionloss="3"/>'
+        '<geom size=".05" mass="1"/></body></worldbody></mujoco>'
+    )
+    rftsim.add_sand(spec, "preset=poppy-seeds")
+    worlds = rftsim.warp.put(spec, nworld=2, iterations=2)
+    ways = []
+    for past in (0.0, 50.0):
+        mjw.reset_data(worlds.m, worlds.d)
+        worlds.d.qfrc_constraint.fill_(past)
+        worlds.sand.reset()
+        way = []
+        for _ in range(5):
+            mjw.step(worlds.m, worlds.d)
+            way.append(worlds.d.qpos.numpy().copy())
+        ways.append(way)
+    np.testing.assert_array_equal(*ways)
+
+
 def _apart(subject: Subject, h: float, duration: float, iterations: int) -> float:
     """How far a robot on Warp gets from the engine plugin's at most, over the length of its way."""
     model = subject.stage(subject.laws[0]).model
