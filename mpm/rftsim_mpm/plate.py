@@ -45,9 +45,9 @@ class Plate:
     length: float = 0.05
     """Length, and in 3D width [m]."""
     thickness: float | None = None
-    """Thickness; by default 0.3 lengths, in 3D 0.2 [m]."""
+    """Thickness; else 0.3 lengths, 0.2 in 3D [m]."""
     depth: float | None = None
-    """Depth of the reading; by default 0.4 lengths [m]."""
+    """Depth of the reading; else 0.4 lengths [m]."""
     speed: float = 0.1
     """Speed of the plate [m/s]."""
     buried: float = 0.6
@@ -55,7 +55,7 @@ class Plate:
     cells: float = 10.0
     """Cells per plate length."""
     young: float | None = None
-    """Young's modulus; by default by softness [Pa]."""
+    """Young's modulus; else by softness [Pa]."""
     softness: float = 0.005
     """Strain of the sand, rho g z N_q / E."""
     courant: float = 0.3
@@ -71,11 +71,11 @@ class Plate:
     xpic: int = 0
     """Order of XPIC; 0 is FLIP."""
     symmetric: bool = True
-    """In 3D, model half or a quarter if that serves."""
+    """In 3D, model a part if it serves."""
     run_up: float = later(0.0)
-    """Travel in which it evenly speeds up [lengths]."""
+    """Travel in which it speeds up [lengths]."""
     absorb: float = later(0.0)
-    """Width of layers at floor and walls that absorb waves [lengths]."""
+    """Edge that absorbs waves [lengths]."""
 
     def __post_init__(self) -> None:
         if self.dim not in (2, 3):

@@ -40,18 +40,18 @@ PITCHES = 20
 
 @dataclasses.dataclass(frozen=True)
 class HeldWheel(Wheel):
-    """The wheel of `Wheel`, free, or held at a slip, and at a sinkage if one is given."""
+    """The wheel of `Wheel`: free, held at a slip, or at a slip and a sinkage."""
 
     prescribed_slip: float | None = None
     """Slip if held, 1 - v / (omega r) [-]."""
     prescribed_sinkage: float | None = None
-    """Sinkage of its tips if held [m]; else it sinks under its load."""
+    """Sinkage of its tips; else it sinks [m]."""
     shift: float = 0.0
     """If held, place on the grid [cells]."""
     calm: float = 0.01
     """If held, as in `Simulation` [s]."""
     dim: int = later(2)
-    """2: plane strain; 3: if held, half of a wheel as broad as `breadth`, and its image."""
+    """2: plane strain; 3: in space, if held."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

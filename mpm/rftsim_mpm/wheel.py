@@ -27,21 +27,21 @@ class Wheel:
     """The wheel of Table 4.1 on the poppy seeds of Table 4.2, in plane strain."""
 
     rpm: float = 30.0
-    """Spin; above 0 it rolls to +x [1/min]."""
+    """Spin, to +x above 0 [1/min]."""
     duration: float | None = None
-    """Simulated time [s]; by default one second and half a turn."""
+    """Simulated time; else 1 s and half a turn [s]."""
     entry: float = 0.8
     """Speed at the start over omega r [-]."""
     radius: float = 0.094
     """Radius without grousers [m]."""
     grousers: int = 20
-    """How many grousers; with 0 it is a disc."""
+    """How many grousers, or 0."""
     height: float = 0.012
     """Height of a grouser [m]."""
     width: float = 0.006
     """Width of one along the rim [m]."""
     breadth: float = 0.14
-    """Breadth, by which masses and forces are divided [m]."""
+    """Breadth, which divides all forces [m]."""
     mass_x: float = 23.0
     """Inertia along [kg]."""
     mass_z: float = 6.3
@@ -53,9 +53,9 @@ class Wheel:
     mu_surf: float = 0.35
     """Friction between sand and wheel [-]."""
     rho: float = 638.0
-    """Critical density of the sand [kg/m^3]."""
+    """Critical density [kg/m^3]."""
     dx: float = 0.004
-    """Size of a cell [m]; a grouser must be more than a cell wide."""
+    """Cell, less than a grouser's width [m]."""
     xpic: int = 0
     """Order of XPIC; 0 is FLIP."""
     gravity: float = 9.81
