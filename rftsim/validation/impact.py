@@ -21,8 +21,12 @@ from rftsim.validation.study import Measured, Request, Row, near
 
 Array = NDArray[np.float64]
 
-LAWS: Final = ("rft3d", "drft3d")
-"""Laws under which spheres fall."""
+LAMBDA: Final = Sand(xi_n=1e6).lambda_
+"""Factor of the inertial term that `drft3d` has unless told otherwise [-]."""
+OURS: Final = f"drft3d, λ {LAMBDA:g}"
+"""The case that is judged."""
+CASES: Final = {"rft3d": ("rft3d", 0.0), OURS: ("drft3d", LAMBDA), "drft3d, λ 1.7": ("drft3d", 1.7)}
+"""Laws and factors of the inertial term under which spheres fall."""
 HEIGHTS: Final = (0.02, 0.05, 0.1, 0.2, 0.5)
 """Heights from which they fall, of their lowest point above the sand [m]."""
 DIAMETERS: Final = (0.0127, 0.0254, 0.0508)
@@ -39,30 +43,29 @@ EXPONENTS: Final = {"drop distance": 1 / 3, "diameter": 2 / 3, "sphere's over sa
 """Exponents of the depth that were measured, see SOURCE."""
 PREFACTOR: Final = 0.14
 """Depth over the product of those powers, that of the density as a ratio, lengths in metres."""
-SOURCE: Final = "Uehara et al. 2003, measured"
+SOURCE: Final = "[Uehara2003], measured"
 STEP: Final = 5e-4
 """Time step of a fall [s]."""
 STILL: Final = 1e-4
 """Speed at which a sphere has stopped [m/s]."""
-LAMBDA: Final = Sand(xi_n=1e6).lambda_
-"""Factor of the inertial term under which spheres fall [-]."""
 BAND: Final = 0.4
 """How far from that the continuum's may be [-]."""
 
 
 def jobs(request: Request) -> dict[str, Callable[[], Any]]:
     """The job that reads what is shipped, and one for each law and diameter of sphere."""
-    drops = {f"{law}/{size:g}": functools.partial(_drops, law, size) for law in LAWS for size in DIAMETERS}
+    drops = {f"{case}/{size:g}": functools.partial(_drops, *CASES[case], size) for case in CASES for size in DIAMETERS}
     return shipped("speeds", _read) | drops
 
 
-def _drops(law: str, diameter: float) -> list[dict[str, float]]:
+def _drops(law: str, inertia: float, diameter: float) -> list[dict[str, float]]:
     return [
         {"height": height, "diameter": diameter, "density": density, "friction": friction, "depth": depth}
         for friction in FRICTIONS
         for density in DENSITIES
         for height in HEIGHTS
-        for depth in [drop(law, Sand(rho_c=BULK, mu_int=friction, mu_surf=SURFACE), height, diameter, density)]
+        for sand in [Sand(rho_c=BULK, mu_int=friction, mu_surf=SURFACE, lambda_=inertia)]
+        for depth in [drop(law, sand, height, diameter, density)]
     ]
 
 
@@ -137,9 +140,9 @@ def inertia_of(plates: list[dict[str, Any]]) -> dict[tuple[float, float, float],
 
 def _sphere_rows(measured: Measured) -> list[Row]:
     table = []
-    for law in LAWS:
+    for law in CASES:
         exponents, factor = law_of(_spheres(measured, law))
-        compared = law == LAWS[-1]
+        compared = law == OURS
         for (name, expected), got in zip(EXPONENTS.items(), exponents, strict=True):
             what = f"{law}: exponent of a sphere's depth over {name}"
             within = 0.15 * abs(expected) if compared else math.inf
@@ -195,7 +198,7 @@ def draw(measured: Measured, figure: Any) -> None:
     left.set_xlabel("speed² [m²/s²]")
     left.set_ylabel("force per area [kPa]")
     left.set_title("plates in the continuum", fontsize=10)
-    for k, law in enumerate(LAWS):
+    for k, law in enumerate(CASES):
         spheres = _spheres(measured, law)
         got = 1e3 * np.array([one["depth"] for one in spheres])
         right.loglog(1e3 * measured_depth(spheres), got, ".", color=f"C{k}", label=law)

@@ -23,7 +23,7 @@ def test_powers_come_back():
     assert factor == pytest.approx(1.0, rel=1e-12)
 
 
-@pytest.mark.parametrize("law", impact.LAWS)
+@pytest.mark.parametrize("law", ["rft3d", "drft3d"])
 def test_a_fall_scales(law):
     """At equal ratios of height, diameter and depth all falls are one: F / (rho g D^3) knows no other length."""
     sand = Sand(rho_c=1510.0, mu_int=0.4, mu_surf=0.3)
@@ -34,7 +34,9 @@ def test_a_fall_scales(law):
 def test_inertia_stops_a_sphere_sooner():
     """The faster it falls the more: depths under drft3d over those under rft3d fall with the height."""
     sand = Sand(rho_c=1510.0, mu_int=0.4, mu_surf=0.3)
-    depths = np.array([[impact.drop(law, sand, h, 0.0254, 2200.0) for h in (0.02, 0.1, 0.5)] for law in impact.LAWS])
+    depths = np.array(
+        [[impact.drop(law, sand, h, 0.0254, 2200.0) for h in (0.02, 0.1, 0.5)] for law in ("rft3d", "drft3d")]
+    )
     ratio = depths[1] / depths[0]
     assert (ratio < 1.0).all()
     assert (np.diff(ratio) < 0.0).all()
