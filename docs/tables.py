@@ -46,7 +46,6 @@ DEAR = {
     "warp.txt": "rftsim bench warp",
     "warp-cases.txt": f"rftsim bench warp --cases {WARP_CASES}",
 }
-NAMES = ("wheel", "runner", "hexapod", "hopper", "quadruped", "go1", "rover")
 
 
 def _evaluate(*runs: str, more: str = "") -> str:
@@ -54,13 +53,12 @@ def _evaluate(*runs: str, more: str = "") -> str:
     return f"rftsim evaluate {' '.join(f'out/train/{run}' for run in runs)}{more} --markdown"
 
 
+_ON_SANDS = " --on 'half as strong,sand,twice as strong,dunes,poppy-seeds,medium-sand'"
 _SANDS = "half as strong,twice as strong,dunes,poppy-seeds"
 TRAINED = {
     "evaluate-level.md": _evaluate("wheel", "runner", "hexapod", "hopper", more=" --on 'as trained' --baseline"),
-    "evaluate-sands.md": _evaluate(
-        *(f"{name}-sands" for name in NAMES),
-        more=" --on 'half as strong,sand,twice as strong,dunes,poppy-seeds,medium-sand'",
-    ),
+    "evaluate-sands.md": _evaluate("wheel-sands", "runner-sands", "hexapod-sands", "hopper-sands", more=_ON_SANDS),
+    "evaluate-sands-robots.md": _evaluate("quadruped-sands", "go1-sands", "rover-sands", more=_ON_SANDS),
     "evaluate-rover.md": _evaluate("rover-sands"),
     "evaluate-go1.md": _evaluate("go1", more=" --baseline"),
     "evaluate-go1-sands.md": _evaluate("go1-sands"),
