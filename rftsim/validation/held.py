@@ -125,7 +125,7 @@ def _loaded_rows(measured: Measured) -> list[Row]:
             what, found, expected, source = LAWS[-1], measured[f"loaded {LAWS[-1]}/{slip:g}"], one, "our continuum"
         else:
             what, found, expected, source = f"continuum, {1e3 * one['dx']:g} mm", one, coarse[slip], "itself at 4 mm"
-        note = f"it sinks by {1e3 * one['sinking_m']:.1f} mm in the time of the means"
+        note = f"sinkage changes by {1e3 * one['sinking_m']:+.1f} mm meanwhile"
         for name, unit, factor in (("sinkage_m", "mm", 1e3), ("drawbar_N_m", "N/m", 1.0), ("torque_N", "N", 1.0)):
             said = f"{what}, under its load, slip {slip:g}: {name.partition('_')[0]}"
             rows.append(Row(said, factor * found[name], source, unit, expected=factor * expected[name], note=note))

@@ -14,7 +14,7 @@ from rftsim_mpm.shapes import drum
 from rftsim.law.rigid import surface_force
 from rftsim.sand.medium import Sand
 from rftsim.surface.triangles import make_surface
-from rftsim.validation.held import FORCES
+from rftsim.validation.held import CONVERGED, FORCES
 from rftsim.validation.shipped import Results, outcome, shipped
 from rftsim.validation.study import Measured, Request, Row, near
 
@@ -22,8 +22,6 @@ STRENGTHS: Final = {"own": "ξ_n of our flat plates", "table": "ξ_n of Table C.
 """Strengths of the law's sand, by the names that they have here."""
 SIDES: Final = 96
 """Sides of the wheel that the law feels."""
-WITHIN: Final = 0.15
-"""Part of the load by which each force may be off, with the strength of our plates [-]."""
 
 
 def jobs(request: Request) -> dict[str, Callable[[], Any]]:
@@ -75,7 +73,7 @@ def _strengths(measured: Measured, wheel: dict[str, Any]) -> dict[str, float]:
 
 
 def rows(measured: Measured) -> list[Row]:
-    """The rows of the law against the continuum's finest cells, and of these against coarser ones."""
+    """The rows of the law against the continuum's finest cells, to be read, and of these against coarser ones."""
     wheels, table = outcome(measured, "drum") or [], []
     for which in sorted({_place(one) for one in wheels}):
         *coarser, wheel = (one for one in wheels if _place(one) == which)
@@ -83,17 +81,14 @@ def rows(measured: Measured) -> list[Row]:
         for name, xi_n in _strengths(measured, wheel).items():
             forces = law(wheel, xi_n)
             for force in FORCES:
-                expected = wheel[force]
-                size = abs(wheel["load_N_m"] if force != "torque_N" else expected)
-                within = WITHIN * size if name == "own" else math.inf
                 said = f"rft3d, {STRENGTHS[name]}, {what}: {_said(force)}"
-                table.append(near(said, forces[force], expected, within, "our continuum", unit=_unit(force)))
+                table.append(Row(said, forces[force], "our continuum", _unit(force), expected=wheel[force]))
         for one in coarser:
-            said = f"continuum, {what}, cells of {1e3 * wheel['dx']:g} over {1e3 * one['dx']:g} mm"
-            table += [
-                Row(f"{said}: {_said(force)}", wheel[force], "itself before", _unit(force), expected=one[force])
-                for force in FORCES
-            ]
+            said = f"continuum, {what}, cells of {1e3 * one['dx']:g} to {1e3 * wheel['dx']:g} mm"
+            for force in FORCES:
+                within = CONVERGED * abs(one["torque_N" if force == "torque_N" else "load_N_m"])
+                more = {"unit": _unit(force), "source": "itself before"}
+                table.append(near(f"{said}: {_said(force)}", wheel[force], one[force], within, **more))
     return table
 
 
