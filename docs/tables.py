@@ -57,8 +57,9 @@ _ON_SANDS = " --on 'half as strong,sand,twice as strong,dunes,poppy-seeds,medium
 _SANDS = "half as strong,twice as strong,dunes,poppy-seeds"
 TRAINED = {
     "evaluate-level.md": _evaluate("wheel", "runner", "hexapod", "hopper", more=" --on 'as trained' --baseline"),
-    "evaluate-sands.md": _evaluate("wheel-sands", "runner-sands", "hexapod-sands", "hopper-sands", more=_ON_SANDS),
+    "evaluate-sands.md": _evaluate("wheel-sands", "runner-sands", "hexapod-sands", more=_ON_SANDS),
     "evaluate-sands-robots.md": _evaluate("quadruped-sands", "go1-sands", "rover-sands", more=_ON_SANDS),
+    "evaluate-hopper.md": _evaluate("hopper-sands"),
     "evaluate-rover.md": _evaluate("rover-sands"),
     "evaluate-go1.md": _evaluate("go1", more=" --baseline"),
     "evaluate-go1-sands.md": _evaluate("go1-sands"),

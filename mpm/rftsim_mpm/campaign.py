@@ -62,8 +62,8 @@ MEASURES: dict[type[Job], Callable[[Any, Watch | None], Any]] = {
 MOST_JOBS = 100_000
 """Most jobs of one file."""
 DATA = Path(__file__).parent / "data"
-"""Campaigns that are shipped: `plates`, `flat`, `solids`, `deep`, `rates`, `speeds`, `wheels`, `slopes`, `ruts`
-and `held`."""
+"""Campaigns that are shipped: `plates`, `flat`, `solids`, `deep`, `rates`, `speeds`, `wheels`, `slopes`, `ruts`,
+`held`, `loaded` and `drum`."""
 
 
 class Status(NamedTuple):

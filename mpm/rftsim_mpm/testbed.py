@@ -74,7 +74,7 @@ class HeldWheel(Wheel):
 
     @property
     def held(self) -> bool:
-        """Whether the slip is prescribed."""
+        """Whether it is held: whether its slip is prescribed."""
         return self.prescribed_slip is not None
 
     @property

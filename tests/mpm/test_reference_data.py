@@ -19,7 +19,10 @@ def plates():
     return results(DATA / "plates")
 
 
-@pytest.mark.parametrize("name", ["plates", "flat", "deep", "rates", "wheels", "solids", "slopes", "ruts", "held"])
+@pytest.mark.parametrize(
+    "name",
+    [*("plates", "flat", "deep", "rates", "speeds", "wheels", "solids", "slopes", "ruts"), "held", "loaded", "drum"],
+)
 def test_they_are_whole(name):
     """Everything that was asked for is there, as it was written."""
     found = status(DATA / name)

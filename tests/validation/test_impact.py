@@ -60,7 +60,7 @@ def test_lambda_comes_back():
 
 
 def test_the_continuum_has_an_inertial_term():
-    """Forces on flat plates of the continuum grow as the square of the speed: pairs of speeds give one lambda within 25 %."""
+    """Forces on flat plates grow as the square of the speed: pairs of speeds give one lambda within 25 %."""
     plates = impact._read(results(DATA / "speeds"))
     flat = [p for p in plates if (p["beta"], p["gamma"], p["mu_int"], p["cells"]) == (0.0, 90.0, 0.4, 6.0)]
     by_pair = [
