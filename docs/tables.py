@@ -2,7 +2,7 @@
 
 python docs/tables.py             # all that take less than a minute each: `make tables`
 python docs/tables.py --all       # the dear ones too, an hour or two: a quiet machine is worth waiting for
-python docs/tables.py NAME ...    # some: kernel.txt validate-ruts.md; those of policies, which docs/training.md trains
+python docs/tables.py NAME ...    # some: kernel.txt validate-ruts.md; those of policies, which docs/policies.md trains
 
 A text file begins with its command, and a Markdown file ends with it. A table whose command fails stays as it was;
 `rftsim validate` ends with 1 where a row fails, which is a result.
@@ -49,7 +49,7 @@ DEAR = {
 
 
 def _evaluate(*runs: str, more: str = "") -> str:
-    """The command that scores policies of docs/training.md."""
+    """The command that scores policies of docs/policies.md."""
     return f"rftsim evaluate {' '.join(f'out/train/{run}' for run in runs)}{more} --markdown"
 
 

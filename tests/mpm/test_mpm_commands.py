@@ -64,7 +64,7 @@ def test_the_same_for_people(capsys):
         (["drag", "--depths", "0.02"], "two depths"),
         (["wheel", "--grousers", "500"], "do not fit"),
         (["wheel", "--dx", "0.02"], "too thin"),
-        (["wheel", "--prescribed-slip", "0.3"], "prescribe both"),
+        (["wheel", "--prescribed-sinkage", "0.03"], "prescribed_slip is missing"),
         (["footprint", "--cells", "2"], "cells must be in"),
         (["blade", "--thickness", "0.001"], "too thin"),
         (["rut", "--rest", "-1"], "rest must be positive"),
