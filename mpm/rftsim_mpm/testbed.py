@@ -149,14 +149,14 @@ def hold(study: HeldWheel, watch: Watch | None = None) -> Held:
     if count < 2:
         raise MpmError(f"half of {study.time:g} s must hold two pitches of {pitch:g} s: a longer duration, or more rpm")
     sim = _prepared(study)
-    level = sim.bodies[0].position[-1] - study.outer + _first_sinkage(study)
+    first = sim.bodies[0].position[-1]
     track = follow(sim, study.time, watch)
     way = math.copysign(1.0, study.rpm)
     torque = track.moment[:, 0, 0 if study.dim == 2 else 1]
     forces = np.column_stack([track.force[:, 0, -1], way * track.force[:, 0, 0], -way * torque])
     if study.dim == 3:
         forces *= 2.0 / study.breadth
-    sinkages = level + study.outer - track.position[:, 0, -1]
+    sinkages = _first_sinkage(study) + first - track.position[:, 0, -1]
     late = track.time >= study.time - count * pitch
     table = np.column_stack([forces, sinkages])[late]
     parts = np.array([part.mean(axis=0) for part in np.array_split(table, count)])

@@ -13,6 +13,7 @@ from typing import Any, Final
 
 import numpy as np
 from rftsim_models.wheels import GROUSER_WHEEL
+from rftsim_mpm.testbed import HeldWheel
 
 from rftsim.law.rigid import surface_force
 from rftsim.run.scenes import POPPY
@@ -29,7 +30,7 @@ SINKAGE: Final = 0.03
 """Sinkage at which the slip is varied [m]."""
 LOADED_SLIPS: Final = (0.0, 0.1, 0.2, 0.3, 0.4, 0.6)
 """Slips of the shipped wheels that sink under their load [-]."""
-LOAD: Final = 6.3 * 9.81 / 0.14
+LOAD: Final = HeldWheel.mass_z * HeldWheel.gravity / HeldWheel.breadth
 """That load, per metre of breadth [N/m]."""
 RATE: Final = math.pi
 """Angular velocity of the wheels, 30 turns a minute [rad/s]."""

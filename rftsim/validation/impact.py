@@ -12,6 +12,8 @@ from typing import Any, Final
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
+from rftsim_mpm.plate import Plate
+from rftsim_mpm.reading import limit
 
 from rftsim.model.add_sand import add_sand
 from rftsim.sand.medium import Sand
@@ -21,8 +23,10 @@ from rftsim.validation.study import Measured, Request, Row, near
 
 Array = NDArray[np.float64]
 
-LAMBDA: Final = Sand(xi_n=1e6).lambda_
+LAMBDA: Final = Sand.lambda_
 """Factor of the inertial term that `drft3d` has unless told otherwise [-]."""
+BAND: Final = 0.4
+"""How far from that the continuum's may be [-]."""
 OURS: Final = f"drft3d, λ {LAMBDA:g}"
 """The case that is judged."""
 CASES: Final = {"rft3d": ("rft3d", 0.0), OURS: ("drft3d", LAMBDA), "drft3d, λ 1.7": ("drft3d", 1.7)}
@@ -48,8 +52,6 @@ STEP: Final = 5e-4
 """Time step of a fall [s]."""
 STILL: Final = 1e-4
 """Speed at which a sphere has stopped [m/s]."""
-BAND: Final = 0.4
-"""How far from that the continuum's may be [-]."""
 
 
 def jobs(request: Request) -> dict[str, Callable[[], Any]]:
@@ -104,16 +106,15 @@ def rows(measured: Measured) -> list[Row]:
 
 
 def _plate_rows(plates: list[dict[str, Any]]) -> list[Row]:
-    found = inertia_of(plates)
     table = []
-    for (beta, gamma, friction), by_cells in found.items():
+    for (beta, gamma, friction), by_cells in inertia_of(plates).items():
         what = f"continuum: λ of a plate, β {beta:g}°, γ {gamma:g}°, μ_int {friction:g}"
         coarse, *finer = sorted(by_cells)
         for cells in (coarse, *finer):
             table.append(Row(f"{what}, {cells:g} cells", by_cells[cells], "our continuum"))
         for cells in finer:
-            limit = by_cells[cells] + (by_cells[cells] - by_cells[coarse]) / (cells / coarse - 1.0)
-            table.append(near(f"{what}, limit", limit, LAMBDA, BAND, "drft3d's own λ"))
+            found = limit(np.array(by_cells[coarse]), np.array(by_cells[cells]), cells / coarse)
+            table.append(near(f"{what}, limit", float(found), LAMBDA, BAND, "drft3d's own λ"))
     return table
 
 
@@ -127,33 +128,37 @@ def inertia_of(plates: list[dict[str, Any]]) -> dict[tuple[float, float, float],
         For each (beta, gamma, mu_int) lambda by the number of cells to a plate.
     """
     found: dict[tuple[float, float, float], dict[float, float]] = {}
-    for which in sorted({(p["beta"], p["gamma"], p["mu_int"], p["cells"]) for p in plates}):
-        own = [p for p in plates if (p["beta"], p["gamma"], p["mu_int"], p["cells"]) == which]
-        beta, gamma = np.radians(which[:2])
-        normal, way = np.array([np.sin(beta), 0.0, -np.cos(beta)]), np.array([np.cos(gamma), 0.0, -np.sin(gamma)])
-        force = np.array([-np.dot(p["force"], normal) for p in own])
-        unit = np.array([p["rho"] * (p["length"] * p["speed"] * (way @ normal)) ** 2 for p in own])
+    for which in sorted({_kind(p) for p in plates}):
+        own, plate = [p for p in plates if _kind(p) == which], Plate(dim=3, beta=which[0], gamma=which[1])
+        force = np.array([-np.dot(p["force"], plate.leading) for p in own])
+        across = float(plate.direction @ plate.leading)
+        unit = np.array([p["rho"] * (p["length"] * p["speed"] * across) ** 2 for p in own])
         _, inertia = fit_terms(np.ones(len(own)), unit, force)
         found.setdefault(which[:3], {})[which[3]] = inertia
     return found
 
 
+def _kind(plate: dict[str, Any]) -> tuple[float, float, float, float]:
+    """What plates have in common that differ in speed alone: beta, gamma [deg], mu_int [-], and cells to a plate."""
+    return plate["beta"], plate["gamma"], plate["mu_int"], plate["cells"]
+
+
 def _sphere_rows(measured: Measured) -> list[Row]:
     table = []
-    for law in CASES:
-        exponents, factor = law_of(_spheres(measured, law))
-        compared = law == OURS
+    for case in CASES:
+        exponents, factor = law_of(_spheres(measured, case))
+        compared = case == OURS
         for (name, expected), got in zip(EXPONENTS.items(), exponents, strict=True):
-            what = f"{law}: exponent of a sphere's depth over {name}"
+            what = f"{case}: exponent of a sphere's depth over {name}"
             within = 0.15 * abs(expected) if compared else math.inf
             table.append(near(what, float(got), expected, within, SOURCE))
-        what, within = f"{law}: a sphere's depth over the measured law, geometric mean", 0.25 if compared else math.inf
+        what, within = f"{case}: a sphere's depth over the measured law, geometric mean", 0.25 if compared else math.inf
         table.append(near(what, factor, 1.0, within, SOURCE))
     return table
 
 
-def _spheres(measured: Measured, law: str) -> list[dict[str, float]]:
-    return [one for size in DIAMETERS for one in measured[f"{law}/{size:g}"]]
+def _spheres(measured: Measured, case: str) -> list[dict[str, float]]:
+    return [one for size in DIAMETERS for one in measured[f"{case}/{size:g}"]]
 
 
 def law_of(spheres: list[dict[str, float]]) -> tuple[Array, float]:
@@ -189,19 +194,18 @@ def draw(measured: Measured, figure: Any) -> None:
     """Draw the plates' stress over their speed, and the spheres' depth over the one that was measured."""
     left, right = figure.subplots(1, 2)
     plates = outcome(measured, "speeds") or []
-    kinds = sorted({(p["beta"], p["gamma"], p["mu_int"], p["cells"]) for p in plates})
-    for k, kind in enumerate(kinds):
-        own = sorted((p for p in plates if (p["beta"], p["gamma"], p["mu_int"], p["cells"]) == kind), key=_speed)
+    for k, kind in enumerate(sorted({_kind(p) for p in plates})):
+        own = sorted((p for p in plates if _kind(p) == kind), key=lambda p: float(p["speed"]))
         stress = [1e-3 * float(np.linalg.norm(p["force"])) / p["length"] ** 2 for p in own]
         label = f"β {kind[0]:g}°, γ {kind[1]:g}°, μ {kind[2]:g}, {kind[3]:g} cells"
         left.plot([p["speed"] ** 2 for p in own], stress, "o-", color=f"C{k % 10}", label=label)
     left.set_xlabel("speed² [m²/s²]")
     left.set_ylabel("force per area [kPa]")
     left.set_title("plates in the continuum", fontsize=10)
-    for k, law in enumerate(CASES):
-        spheres = _spheres(measured, law)
+    for k, case in enumerate(CASES):
+        spheres = _spheres(measured, case)
         got = 1e3 * np.array([one["depth"] for one in spheres])
-        right.loglog(1e3 * measured_depth(spheres), got, ".", color=f"C{k}", label=law)
+        right.loglog(1e3 * measured_depth(spheres), got, ".", color=f"C{k}", label=case)
     line = np.array(right.get_xlim())
     right.loglog(line, line, "k--", linewidth=1, label=SOURCE)
     right.set_xlabel("measured law of depth [mm]")
@@ -210,7 +214,3 @@ def draw(measured: Measured, figure: Any) -> None:
     for axis in (left, right):
         axis.grid(alpha=0.3)
         axis.legend(fontsize=7)
-
-
-def _speed(plate: dict[str, Any]) -> float:
-    return float(plate["speed"])

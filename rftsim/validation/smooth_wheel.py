@@ -4,6 +4,7 @@ Computes no continuum: reads the campaign `drum` of `rftsim_mpm/data`, a wheel o
 `measured`, and the flat plates of `plates`, which say how strong the continuum's sand is.
 """
 
+import functools
 import math
 from collections.abc import Callable
 from typing import Any, Final
@@ -13,7 +14,7 @@ from rftsim_mpm.shapes import drum
 
 from rftsim.law.rigid import surface_force
 from rftsim.sand.medium import Sand
-from rftsim.surface.triangles import make_surface
+from rftsim.surface.triangles import Surface, make_surface
 from rftsim.validation.held import CONVERGED, FORCES
 from rftsim.validation.shipped import Results, outcome, shipped
 from rftsim.validation.study import Measured, Request, Row, near
@@ -51,16 +52,27 @@ def law(wheel: dict[str, Any], xi_n: float) -> dict[str, float]:
         wheel: What the continuum held.
         xi_n: Strength of the sand [N/m^3].
     """
-    shape, omega = drum(wheel["radius"], wheel["breadth"], SIDES), wheel["rpm"] * math.pi / 30.0
+    omega = wheel["rpm"] * math.pi / 30.0
     sand = Sand(rho_c=wheel["rho"], mu_int=wheel["mu_int"], mu_surf=wheel["mu_surf"], xi_n=xi_n)
     found = surface_force(
-        make_surface(shape.vertices, shape.faces), sand, "rft3d",
+        _surface(wheel["radius"], wheel["breadth"]), sand, "rft3d",
         position=(0.0, 0.0, wheel["radius"] - wheel["prescribed_sinkage"]),
         velocity=((1.0 - wheel["prescribed_slip"]) * omega * wheel["radius"], 0.0, 0.0),
         angular_velocity=(0.0, omega, 0.0),
     )  # fmt: skip
     forces = found.force[2], found.force[0], -found.moment[1]
     return dict(zip(FORCES, (np.array(forces) / wheel["breadth"]).tolist(), strict=True))
+
+
+@functools.cache
+def _surface(radius: float, breadth: float) -> Surface:
+    shape = drum(radius, breadth, SIDES)
+    return make_surface(shape.vertices, shape.faces)
+
+
+def _laws(measured: Measured, wheel: dict[str, Any]) -> dict[str, dict[str, float]]:
+    """The forces of the law on a wheel, by the names of STRENGTHS."""
+    return {name: law(wheel, xi_n) for name, xi_n in _strengths(measured, wheel).items()}
 
 
 def _strengths(measured: Measured, wheel: dict[str, Any]) -> dict[str, float]:
@@ -78,8 +90,7 @@ def rows(measured: Measured) -> list[Row]:
     for which in sorted({_place(one) for one in wheels}):
         *coarser, wheel = (one for one in wheels if _place(one) == which)
         what = f"slip {which[0]:g}, sinkage {1e3 * which[1]:g} mm"
-        for name, xi_n in _strengths(measured, wheel).items():
-            forces = law(wheel, xi_n)
+        for name, forces in _laws(measured, wheel).items():
             for force in FORCES:
                 said = f"rft3d, {STRENGTHS[name]}, {what}: {_said(force)}"
                 table.append(Row(said, forces[force], "our continuum", _unit(force), expected=wheel[force]))
@@ -107,6 +118,7 @@ def _unit(force: str) -> str:
 def draw(measured: Measured, figure: Any) -> None:
     """Draw load, drawbar and torque over the slip, of the continuum and of the law with either strength."""
     wheels = outcome(measured, "drum") or []
+    laws = {_place(one): _laws(measured, one) for one in wheels}
     names = ("load [N/m]", "drawbar [N/m]", "torque [N]")
     for axis, force, said in zip(figure.subplots(1, 3), FORCES, names, strict=True):
         for k, sinkage in enumerate(sorted({one["prescribed_sinkage"] for one in wheels})):
@@ -115,11 +127,11 @@ def draw(measured: Measured, figure: Any) -> None:
                 points = sorted((one["prescribed_slip"], one[force]) for one in own if one["dx"] == dx)
                 label = f"continuum, {1e3 * sinkage:g} mm deep, cells {1e3 * dx:g} mm"
                 axis.plot(*np.array(points).T, mark, color=f"C{k}", label=label)
-            level = sorted((one for one in own if one["dx"] == own[0]["dx"]), key=_place)
+            level = sorted({_place(one) for one in own})
             for name, line in zip(STRENGTHS, ("-", ":"), strict=True):
-                curve = [law(one, _strengths(measured, one)[name])[force] for one in level]
+                curve = [laws[place][name][force] for place in level]
                 said_once = f"rft3d, {STRENGTHS[name]}" if k == 0 else None
-                axis.plot([one["prescribed_slip"] for one in level], curve, line, color=f"C{k}", label=said_once)
+                axis.plot([slip for slip, _ in level], curve, line, color=f"C{k}", label=said_once)
         axis.set_xlabel("slip  $1 - v/(R\\omega)$ [-]")
         axis.set_ylabel(said)
         axis.grid(alpha=0.3)

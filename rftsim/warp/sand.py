@@ -62,11 +62,11 @@ class WarpSand:
             self._sensors = [_sensors_named_for(onto, own.bodies) for own in self.beds]
         model = onto or model
         shape = nworld, model.nv
+        self._is_new = wp.ones(nworld, dtype=bool)
         self._smooth, self._acceleration, self._velocity = (wp.zeros(shape, dtype=float) for _ in range(3))
         self._damped, self._matrix = (wp.zeros((nworld, model.nC), dtype=float) for _ in range(2))
         blocks = io.m_block_layout(model)
         sizes = blocks["total"] + (model.nC if blocks["has_sparse"] else 0), model.nv
-        self._is_new = wp.ones(nworld, dtype=bool)
         self._factors = [wp.zeros((nworld, size), dtype=float) for size in sizes]
 
     def attach(self, m: Any) -> None:
