@@ -50,6 +50,8 @@ class Training:
         max_grad_norm: Largest norm of a gradient; longer ones are shortened to it.
         layers: Units in each hidden layer (tanh) of the policy and of the value, which share none.
         log_std_init: Log of the actions' standard deviation at the start.
+        log_std_last: Log of the largest standard deviation of the actions at the end. Where it is below `log_std_init`,
+            the largest one falls to it linearly from there, so that what walks by its noise learns to walk without.
         normalise: Let the network see observations less their mean and over their standard deviation, which are learnt
             from all that was collected, and kept in the policy.
         start: Folder of a run whose policy is the first one, so that what it can do on easy ground need not be learnt
@@ -71,6 +73,7 @@ class Training:
     max_grad_norm: float = 0.5
     layers: tuple[int, ...] = (64, 64)
     log_std_init: float = -0.5
+    log_std_last: float = FARTHEST_LOG_STD
     normalise: bool = False
     start: str = ""
     physics: Stepper = "batch"
@@ -88,8 +91,10 @@ class Training:
             )
         if max(self.layers) > WIDEST or len(self.layers) > DEEPEST:
             raise TrainingError(f"there are at most {DEEPEST} layers of at most {WIDEST} units, not {self.layers}")
-        if self.learning_rate > 1.0 or abs(self.log_std_init) > FARTHEST_LOG_STD:
-            raise TrainingError(f"learning_rate is at most 1, and log_std_init within {FARTHEST_LOG_STD:g} of zero")
+        if self.learning_rate > 1.0:
+            raise TrainingError(f"learning_rate is at most 1, not {self.learning_rate:g}")
+        if max(abs(self.log_std_init), abs(self.log_std_last)) > FARTHEST_LOG_STD:
+            raise TrainingError(f"log_std_init and log_std_last are within {FARTHEST_LOG_STD:g} of zero")
         if not (0.0 < self.gamma <= 1.0 and 0.0 <= self.gae_lambda <= 1.0):
             raise TrainingError("gamma must be above 0 and at most 1, and gae_lambda between 0 and 1")
 
