@@ -10,6 +10,7 @@ from typing import Final
 
 import numpy as np
 
+from rftsim.law.stress import TINY
 from rftsim.machine.compiling import exact
 from rftsim.solver import constraint_rows, equation, linear_algebra, sparse
 from rftsim.solver.equation import KIND, POINT
@@ -44,6 +45,10 @@ def parts_needed(p, time):
         stopped[k] = after[k] - start[k]
     sparse.substitute(p, equation.mass_factors(p), grown, late)
     worst, fineness = 0.0, FINENESS * equation.numbers(p).tolerance
+    first, weight, total = 0.0, 0.0, TINY
+    for b in range(equation.head(p).nbody):
+        f = equation.wrench_of(p, POINT.best, b, 1)
+        total += np.sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2])
     for b in range(equation.head(p).nbody):
         travel = time * speed_of(p, b, start)
         by_sand = min(speed_of(p, b, stopped), time * speed_of(p, b, pressed))
@@ -54,9 +59,12 @@ def parts_needed(p, time):
         if depth <= 0.0:
             continue
         allowed = fineness * max(depth, SHALLOWEST)
-        worst = max(worst, error / allowed)
+        f = equation.wrench_of(p, POINT.best, b, 1)
+        weight = np.sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2]) / total
+        worst += weight * (error / allowed) ** 2
         if equation.numbers(p).started == 0.0 and travel > allowed:
-            worst = max(worst, 3.9)
+            first = 3.9
+    worst = max(np.sqrt(worst), first)
     return np.ceil(np.sqrt(worst) * h / time) if worst > (time / h) ** 2 else 1.0
 
 
