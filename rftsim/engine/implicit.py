@@ -7,6 +7,8 @@ island of bodies that has one near the sand is then solved for alone, see `islan
 
 from typing import Final
 
+import numpy as np
+
 from rftsim.engine import bodies, constraints, external, instance, islands
 from rftsim.engine.layout import CONSTANTS
 from rftsim.engine.refusals import WHY
@@ -129,10 +131,10 @@ def _couple(number, start, column, i, island, p):
     """Couple what a matrix of MuJoCo's couples below its diagonal: so many columns of each row, from a start."""
     place, dofs, first = islands.place_of(i), islands.dofs(i), islands.dof_start(i)[island]
     for k in range(equation.head(p).ndof):
-        dof = dofs[first + k]
+        dof, known = dofs[first + k], np.int64(0)
         for entry in range(start[dof], start[dof] + number[dof]):
             if column[entry] < dof:
-                sparse.couple(p, k, place[column[entry]])
+                known = sparse.couple_on(p, k, place[column[entry]], known)
 
 
 @inline

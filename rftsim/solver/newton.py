@@ -208,4 +208,5 @@ def _update(p, old, new):
             for k in range(6):
                 g[r, k] += missed[r] / square * (1.0 if k < 3 else length) * moved[k]
         equation.misfit(p)[b] = size_of(missed, 1.0 / length)
-    equation.numbers(p).is_linearised = 0.0
+    if equation.scores(p, new).error > 1.0:
+        equation.numbers(p).is_linearised = 0.0

@@ -7,6 +7,8 @@ the depth of the tree. A matrix is stored with all its entries; those outside of
 
 from typing import Final
 
+import numpy as np
+
 from rftsim.machine.compiling import exact, fast, inline
 from rftsim.machine.memory import doubles, peek, poke
 from rftsim.solver import equation
@@ -16,25 +18,35 @@ _LEAST: Final = 1e-300
 
 
 @exact
-def couple(p, k, other):
-    """Couple degree of freedom k to one before it."""
+def couple_on(p, k, other, known):
+    """Couple degree of freedom k to one before it, the next of a rising row of them.
+
+    Args:
+        p: The equation.
+        k: The degree of freedom.
+        other: The one before it.
+        known: How many that k is coupled to come before the last one of the row.
+
+    Returns:
+        How many come before this one.
+    """
     own, n = equation.coupled(p, k), equation.coupled_length(p)[k]
-    at = n
-    while at > 0 and own[at - 1] > other:
-        at -= 1
-    if at > 0 and own[at - 1] == other:
-        return
-    for i in range(n, at, -1):
-        own[i] = own[i - 1]
-    own[at] = other
-    equation.coupled_length(p)[k] = n + 1
+    while known < n and own[known] < other:
+        known += 1
+    if known == n or own[known] != other:
+        for i in range(n, known, -1):
+            own[i] = own[i - 1]
+        own[known] = other
+        equation.coupled_length(p)[k] = n + 1
+    return known
 
 
 @exact
 def join(p, k, more, count):
-    """Couple degree of freedom k to more of those before it, of which so many are given."""
+    """Couple degree of freedom k to more of those before it, of which so many are given, rising."""
+    known = np.int64(0)
     for i in range(count):
-        couple(p, k, more[i])
+        known = couple_on(p, k, more[i], known)
 
 
 @exact

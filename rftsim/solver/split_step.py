@@ -10,6 +10,7 @@ from typing import Final
 
 import numpy as np
 
+from rftsim.law.stress import TINY
 from rftsim.machine.compiling import exact
 from rftsim.solver import constraint_rows, equation, linear_algebra, sparse
 from rftsim.solver.equation import KIND, POINT
@@ -23,6 +24,8 @@ FINENESS: Final = 5.0
 """Error of the position in a step, over the depth and the tolerance, above which the step is split."""
 SHALLOWEST: Final = 1e-4
 """Depth [m] below which none is resolved."""
+FIRST: Final = 3.9
+"""The same error of a first step in which a body moves by more than what is allowed: two parts."""
 PART_COSTS: Final = 3.0
 """Evaluations' worth of a part, about."""
 MORE: Final = 2.0
@@ -43,21 +46,43 @@ def parts_needed(p, time):
         grown[k] = time * (grown[k] - late[k])
         stopped[k] = after[k] - start[k]
     sparse.substitute(p, equation.mass_factors(p), grown, late)
-    worst, fineness = 0.0, FINENESS * equation.numbers(p).tolerance
-    for b in range(equation.head(p).nbody):
-        travel = time * speed_of(p, b, start)
+    worst = _position_error(p, time)
+    return np.ceil(np.sqrt(worst) * h / time) if worst > (time / h) ** 2 else 1.0
+
+
+@exact
+def _position_error(p, time):
+    """The bodies' error of position over what is allowed, after `parts_needed` filled what it follows from.
+
+    It is the mean square by the bodies' shares of the sand's force: what a grazing body errs by changes the motion
+    little, for a force goes with the depth, and its share of all forces with it.
+    """
+    after, start, late = equation.velocity_of(p, POINT.best), equation.start(p), equation.late(p)
+    stopped, pressed, began = equation.stopped(p), equation.pressed(p), equation.numbers(p).started > 0.0
+    nbody, fineness = equation.head(p).nbody, FINENESS * equation.numbers(p).tolerance
+    square, first, total = 0.0, 0.0, TINY
+    for b in range(nbody):
+        total += _later_force(p, b)
+    for b in range(nbody):
+        travel, share = time * speed_of(p, b, start), _later_force(p, b) / total
         by_sand = min(speed_of(p, b, stopped), time * speed_of(p, b, pressed))
-        error = min(time * max(speed_of(p, b, late), by_sand) / 8.0, travel)
-        if error <= fineness * SHALLOWEST:
+        error = min(time * max(speed_of(p, b, late), by_sand) / 8.0, travel) / fineness
+        if error <= SHALLOWEST:
             continue
         depth = deepest(p, b, after, time)
         if depth <= 0.0:
             continue
-        allowed = fineness * max(depth, SHALLOWEST)
-        worst = max(worst, error / allowed)
-        if equation.numbers(p).started == 0.0 and travel > allowed:
-            worst = max(worst, 3.9)
-    return np.ceil(np.sqrt(worst) * h / time) if worst > (time / h) ** 2 else 1.0
+        square += share * (error / max(depth, SHALLOWEST)) ** 2
+        if not began and travel > fineness * max(depth, SHALLOWEST):
+            first = FIRST
+    return max(np.sqrt(square), first)
+
+
+@exact
+def _later_force(p, b):
+    """Size of the sand's force on a body at the later depths [N]."""
+    f = equation.wrench_of(p, POINT.best, b, 1)
+    return np.sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2])
 
 
 @exact
