@@ -7,6 +7,7 @@ import pytest
 import rftsim
 from rftsim.bench import hard_cases, stability
 from rftsim.files import Kept
+from rftsim.model.readout import instances
 from rftsim.solver.state import KEPT
 
 SAND = rftsim.Sand(xi_n=0.92e6, mu_surf=0.4)
@@ -130,11 +131,13 @@ def test_limited_actuators_answer_as_foreseen():
 def test_random_starts_gain_no_energy(seed):
     """MuJoCo's step does on the sand what was foreseen, split steps and contacts included.
 
-    From the start on the sand has done no work, and in a step it gives back a microjoule of its strain at most.
+    From the start on the sand has done no work, and in a step it gives back a microjoule of its strain at most. At a
+    tenth of the default tolerance steps are split.
     """
     trial = hard_cases.legs(5e-3, "implicit")
     move = hard_cases.start_at_random(trial, seed)
     model, data = trial.model, trial.data
+    instances(model)[0].bed.tolerance *= 0.1
     split, total = 0, 0.0
     for _ in range(100):
         move(data)
@@ -244,5 +247,9 @@ def test_a_thousand_random_starts(starts):
 
 @pytest.mark.slow
 def test_capacity_of_the_legs():
-    """What the cases of the held and the broken legs take for their capacity is measured."""
-    assert hard_cases.capacity_of_legs() == pytest.approx(hard_cases.CAPACITY, rel=0.01)
+    """What the cases of the held and the broken legs take for their capacity is measured.
+
+    A foot that breaks away takes the others along: from one time step to the next the capacity scatters by 3 %.
+    """
+    measured = np.median([hard_cases.capacity_of_legs(h) for h in (4e-4, 8e-4, 1e-3, 1.2e-3, 1.6e-3)])
+    assert measured == pytest.approx(hard_cases.CAPACITY, rel=0.01)
