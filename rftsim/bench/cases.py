@@ -12,10 +12,10 @@ from rftsim.bench.subjects import SUBJECTS, in_motion
 from rftsim.model.add_sand import Force
 from rftsim.surface.triangles import Array
 
-Ground = Literal["none", "explicit", "implicit"]
-"""No sand, or sand with a kind of force."""
+Ground = Literal["none", "explicit", "training", "implicit"]
+"""No sand, or sand with a kind of force; `training` is the implicit one, solved as exactly as training needs."""
 GROUNDS: Final[tuple[Ground, ...]] = ("none", "explicit", "implicit")
-"""Every ground; the first is the one that the others are compared with."""
+"""Every ground but `training`; the first is the one that the others are compared with."""
 FORCES: Final[tuple[Force, ...]] = ("explicit", "implicit")
 """Every kind of force."""
 WINDOW: Final = 0.2

@@ -9,7 +9,7 @@ from rftsim.bench.cases import Ground
 from rftsim.bench.environment import LIMITS, SIMULATIONS, THREADS, Timed
 from rftsim.view.figure import make_figure, save_figure
 
-COLOURS: Final[dict[Ground, str]] = {"explicit": "C3", "implicit": "C0"}
+COLOURS: Final[dict[Ground, str]] = {"explicit": "C3", "training": "C2", "implicit": "C0"}
 """Colour of each force's bars."""
 
 
@@ -24,14 +24,15 @@ def plot_environment(rows: list[Timed], path: Path) -> None:
         own = [row for row in rows if row.sand == force]
         many = [row for row in own if row.batch]
         limit = LIMITS[force]
-        place = np.arange(len(cases)) + 0.35 * (k - 0.5)
-        left.bar(place, [row.ratio for row in own], 0.33, color=colour, label=force)
-        left.axhline(limit, color=colour, linestyle="--", linewidth=1)
-        right.axhline(1.0 / limit, color=colour, linestyle="--", linewidth=1)
+        place = np.arange(len(cases)) + 0.25 * (k - 1.0)
+        left.bar(place, [row.ratio for row in own], 0.23, color=colour, label=force)
+        if limit < np.inf:
+            left.axhline(limit, color=colour, linestyle="--", linewidth=1)
+            right.axhline(1.0 / limit, color=colour, linestyle="--", linewidth=1)
         for j, threads in enumerate(THREADS):
-            at, shares = np.arange(len(many)) + 0.18 * (2 * k + j - 1.5), [row.batch[threads][1] for row in many]
+            at, shares = np.arange(len(many)) + 0.13 * (2 * k + j - 2.5), [row.batch[threads][1] for row in many]
             label = f"{force}, {threads} thread{'s' if threads > 1 else ''}"
-            right.bar(at, shares, 0.16, color=colour, alpha=1.0 - 0.5 * j, label=label)
+            right.bar(at, shares, 0.12, color=colour, alpha=1.0 - 0.5 * j, label=label)
     left.set_yscale("log")
     ticks = [1, 2, 3, 5, 10, 20, 30, 100, 300, 1000]
     left.set_yticks(ticks, [f"{tick}" for tick in ticks])

@@ -9,8 +9,7 @@ from rich.console import Console
 from rich.table import Table
 
 from rftsim.bench import environment, kernel, pareto, tolerances
-from rftsim.bench.cases import GROUNDS
-from rftsim.bench.environment import Timed
+from rftsim.bench.environment import TIMED, Timed
 from rftsim.bench.environment_picture import plot_environment
 from rftsim.bench.kernel_picture import plot_kernel
 from rftsim.bench.pareto import Compared, Tried
@@ -82,8 +81,9 @@ def time_environment(names: tuple[str, ...], quick: bool, plot: Path | None, jso
     print_line(
         console,
         f"µs: processor time of a step; x: over that without sand, throughput likewise; expl.: over that with "
-        f"the explicit force; real: times real time; work: evaluations and derivatives of the force in a step. Medians "
-        f"of {rounds} repetitions, in turn",
+        f"the explicit force; real: times real time; work: evaluations and derivatives of the force in a step; "
+        f"training: the implicit force at a tolerance of {environment.TRAINING:g}. Medians of {rounds} repetitions, in "
+        f"turn",
     )
     if missing:
         print_line(console, f"left out, as they are not there: {', '.join(missing)}")
@@ -199,14 +199,14 @@ def _single_table(rows: list[Timed]) -> Table:
         name, sand = _head(row)
         first = {"none": name, "explicit": f"  {1e3 * row.h:g} ms", "implicit": f"  {row.triangles} triangles"}
         table.add_row(
-            first[row.sand],
+            first.get(row.sand, ""),
             sand,
             f"{1e6 * row.seconds:.4g}" if row.seconds < 9e-3 else f"{1e6 * row.seconds:.0f}",
             "lost" if row.lost else f"{row.ratio:.1f}",
-            f"{row.over_explicit:.1f}" if row.sand == "implicit" else "",
+            f"{row.over_explicit:.1f}" if row.sand in ("implicit", "training") else "",
             f"{row.realtime:.3g}",
             f"{row.evaluations:.1f} + {row.derivatives:.1f}",
-            end_section=row.sand == GROUNDS[-1],
+            end_section=row.sand == TIMED[-1],
         )
     return table
 
@@ -217,7 +217,7 @@ def _batch_table(rows: list[Timed]) -> Table:
     table = make_table(title, ("scene", "sand"), headings)
     for row in rows:
         cells = [cell for rate, share in row.batch.values() for cell in (f"{rate:,.0f}/s", f"{share:.2f}")]
-        table.add_row(*_head(row), *cells, end_section=row.sand == GROUNDS[-1])
+        table.add_row(*_head(row), *cells, end_section=row.sand == TIMED[-1])
     return table
 
 

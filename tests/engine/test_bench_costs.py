@@ -83,16 +83,17 @@ def test_parts_of_pareto_are_chosen_by_name(tmp_path):
 def test_the_step_with_sand_over_the_one_without(tmp_path):
     """Each evaluation of the force costs time; the batch's simulations have sand of their own and lose no step."""
     pytest.importorskip("mujoco.batch")
-    none, explicit, implicit = environment._time(OWN["runner", "drft2d"], 3, lambda _: None)
+    none, explicit, implicit, training = environment._time(OWN["runner", "drft2d"], 3, lambda _: None)
     assert none.ratio == 1.0
     assert 1.0 < explicit.ratio < implicit.ratio
     assert implicit.over_explicit > 1.0
     assert explicit.evaluations == 1.0
     assert implicit.evaluations >= 1.0
-    for one in (explicit, implicit):
+    assert 1.0 <= training.evaluations <= implicit.evaluations
+    for one in (explicit, implicit, training):
         assert all(0.0 < share < 1.0 for _, share in one.batch.values())
-    alone = [one._replace(subject="alone", batch={}) for one in (none, explicit, implicit)]
-    plot_environment([none, explicit, implicit, *alone], tmp_path / "environment.png")
+    alone = [one._replace(subject="alone", batch={}) for one in (none, explicit, implicit, training)]
+    plot_environment([none, explicit, implicit, training, *alone], tmp_path / "environment.png")
     assert (tmp_path / "environment.png").stat().st_size > 10_000
 
 

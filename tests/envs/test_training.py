@@ -84,6 +84,15 @@ def test_each_seed_starts_with_the_policy_of_its_own_seed(finished, tmp_path):
         ppo.train(make_plan(TASK, SHORT, still, seed=2), tmp_path / "next-2")
 
 
+def test_noise_falls_to_what_was_asked(finished, tmp_path):
+    """The deviation is at most what the training's course allows, also where a policy is started with."""
+    quiet = {**TINY, "log_std_init": -0.4, "log_std_last": -2.0, "start": str(finished)}
+    ppo.train(make_plan(TASK, SHORT, quiet), tmp_path / "quiet", threads=1)
+    found = parameters(tmp_path / "quiet" / "policy.zip")["log_std"]
+    last_ceiling = -0.4 * 0.25 - 2.0 * 0.75  # that of the last of four updates, which it may leave by what it learns
+    assert np.allclose(found, last_ceiling, atol=0.1)
+
+
 def test_a_stopped_run_goes_on_from_its_last_update(tmp_path):
     plan, calls = make_plan(TASK, SHORT, TINY), []
 
