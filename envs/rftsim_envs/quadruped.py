@@ -41,8 +41,9 @@ class Quadruped(Walking):
 
     Reward per second: velocity exp(-|v - commanded v|^2 / spread^2)
     + yaw exp(-(w - commanded w)^2 / turning_spread^2) + survival - energy P / (m g 1 m/s) - haste |a - last a|^2
-    - tilt (g_x^2 + g_y^2), v the velocity over the ground in the heading's axes and w the yaw rate, both means over the
-    control step as is the servos' positive power P, and g the direction of gravity in the torso's axes.
+    - tilt (g_x^2 + g_y^2) - crouch max(0, 1 - z / z_pose)^2, v the velocity over the ground in the heading's axes and w
+    the yaw rate, both means over the control step as is the servos' positive power P, z the height of the torso above
+    the ground, and g the direction of gravity in the torso's axes.
     The episode ends in failure where the torso leans 60 deg from the vertical, or its middle is less than 0.1 m above
     the ground.
 

@@ -51,8 +51,7 @@ class Training:
         layers: Units in each hidden layer (tanh) of the policy and of the value, which share none.
         log_std_init: Log of the actions' standard deviation at the start.
         log_std_last: Log of the largest standard deviation of the actions at the end. Where it is below `log_std_init`,
-            the largest one falls to it linearly from there, so that what walks by its noise learns to walk without; a
-            policy that the training starts with gets the noise of `log_std_init`, too.
+            the largest one falls to it linearly from there, so that what walks by its noise learns to walk without.
         normalise: Let the network see observations less their mean and over their standard deviation, which are learnt
             from all that was collected, and kept in the policy.
         start: Folder of a run whose policy is the first one, so that what it can do on easy ground need not be learnt
@@ -110,11 +109,6 @@ class Training:
             if name not in known:
                 raise TrainingError(f"PPO has no setting {name!r} here; it has {', '.join(known)}")
         return dataclasses.replace(self, **changes)
-
-    @property
-    def is_quietened(self) -> bool:
-        """Whether the actions' largest standard deviation falls in the course of the training."""
-        return self.log_std_last < self.log_std_init
 
     def updates(self) -> list[int]:
         """Numbers of control steps of each simulation before each update; together they make `steps`, rounded up."""

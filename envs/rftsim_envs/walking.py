@@ -38,6 +38,7 @@ class WalkingConfig(Config):
         energy: Weight of the power in the reward.
         haste: Weight of the actions' changes in the reward.
         tilt: Weight of the base's lean in the reward.
+        crouch: Weight in the reward of how much lower the base is than in the pose, for what is to wade in weak sand.
         reduction: Error of a body's wrench, relative, up to which its surface is felt by fewer elements, see
             `rftsim.add_sand`; with zero every triangle is felt.
     """
@@ -56,6 +57,7 @@ class WalkingConfig(Config):
     energy: float = 0.2
     haste: float = 0.02
     tilt: float = 2.0
+    crouch: float = 0.0
     reduction: float = 0.05
 
     def __post_init__(self) -> None:
@@ -119,6 +121,7 @@ class Walking(Task):
         self._places = np.array([joint.qposadr[0] for joint in joints], dtype=int)
         self._dofs = np.array([joint.dofadr[0] for joint in joints], dtype=int)
         self._pose: Array = model.key_qpos[0][self._places]
+        self._tall = float(model.key_qpos[0][2])
         self._held: Array = model.key_ctrl[0].copy()
         self._actuators = np.array([model.actuator(name).id for name in self.driven], dtype=int)
         self._middle, self._reach = self.reach(model)
@@ -154,7 +157,7 @@ class Walking(Task):
         )
 
     def rewards(self, moment: Moment) -> dict[str, Array]:
-        """Terms for velocity, turning, survival, power, haste and tilt, (n,) each."""
+        """Terms for velocity, turning, survival, power, haste, tilt and crouching, (n,) each."""
         c, down = self.config, to_body(moment.qpos[:, 3:7], moment.gravity)
         return {
             "velocity": c.velocity * closeness(_velocity(moment) - moment.command[:, :2], c.spread),
@@ -163,6 +166,7 @@ class Walking(Task):
             "power": -c.energy * moment.power / self.weight,
             "haste": -c.haste * ((moment.action - moment.last) ** 2).sum(axis=1),
             "tilt": -c.tilt * (down[:, :2] ** 2).sum(axis=1),
+            "crouch": -c.crouch * np.maximum(1.0 - self._height(moment) / self._tall, 0.0) ** 2,
         }
 
     def failed(self, moment: Moment) -> Flags:

@@ -87,8 +87,6 @@ def train(
     if training.start and not folder.checkpoint.is_file():
         before = _run_before(training.start, plan.seed)
         take_over(model.policy, read_policy(before), before)
-        if training.is_quietened:
-            model.policy.log_std.data.fill_(training.log_std_init)
     with folder.opened(plan):
         run = _Run(plan, env, model, folder, tensorboard)
         began = run.resume()
@@ -205,7 +203,7 @@ class _Run:
     def _quieten(self, left: float) -> None:
         """Let the actions' deviation be at most what it may be with this share of the training left."""
         first, last = self._plan.log_std_init, self._plan.log_std_last
-        if self._plan.is_quietened:
+        if last < first:
             self.model.policy.log_std.data.clamp_(max=left * first + (1.0 - left) * last)
 
     def _normalise(self) -> None:
