@@ -94,6 +94,7 @@ class Locomotion(Walking):
     """
 
     Settings = LocomotionConfig
+    training = dataclasses.replace(Walking.training, log_std_last=-2.5)
     config: LocomotionConfig
 
     def __init__(self, config: LocomotionConfig) -> None:

@@ -42,7 +42,7 @@ def plot_environment(rows: list[Timed], path: Path) -> None:
     for axis, names in ((left, cases), (right, batched)):
         axis.set_xticks(np.arange(len(names)), [f"{name}\n{law}" for name, law in names], rotation=90)
         axis.grid(alpha=0.3, axis="y")
-    left.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, fontsize="small")
+    left.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, fontsize="small")
     right.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, fontsize="small")
     figure.suptitle("What sand adds to MuJoCo's step (dashed: what the wheel was asked to keep)")
     save_figure(figure, path)
