@@ -70,11 +70,12 @@ def test_the_contract_of_all_is_gymnasiums():
 
 
 def test_the_sand_carries_an_ant_that_stands():
+    """It comes to rest within three seconds, at steps of 10 ms, and stays where it is."""
     env = rftsim_envs.on_sand("Ant-v5", reset_noise_scale=0.0)
     env.reset(seed=0)
     model, data = env.unwrapped.model, env.unwrapped.data
-    while data.time < 3.0:
-        if data.time < 2.0:
+    while data.time < 4.0:
+        if data.time < 3.0:
             start = data.qpos[:2].copy()
         _, _, terminated, _, info = env.step(np.zeros(8))
         assert not terminated
