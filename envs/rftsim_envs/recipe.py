@@ -94,7 +94,10 @@ class Training:
         if self.learning_rate > 1.0:
             raise TrainingError(f"learning_rate is at most 1, not {self.learning_rate:g}")
         if max(abs(self.log_std_init), abs(self.log_std_last)) > FARTHEST_LOG_STD:
-            raise TrainingError(f"log_std_init and log_std_last are within {FARTHEST_LOG_STD:g} of zero")
+            raise TrainingError(
+                f"log_std_init and log_std_last are within {FARTHEST_LOG_STD:g} of zero, not {self.log_std_init:g} and "
+                f"{self.log_std_last:g}"
+            )
         if not (0.0 < self.gamma <= 1.0 and 0.0 <= self.gae_lambda <= 1.0):
             raise TrainingError("gamma must be above 0 and at most 1, and gae_lambda between 0 and 1")
 

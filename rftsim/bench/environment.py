@@ -126,7 +126,7 @@ def randomised(model: mujoco.MjModel, batch: Batch, seed: int) -> None:
 def _time(case: Case, rounds: int, report: Callable[[str], Any]) -> list[Timed]:
     """Time a case on every ground, one simulation at a time and in batches."""
     found, begun = case.prepare()
-    found["training"], begun["training"] = for_training(found["implicit"]), begun["implicit"]
+    found["training"], begun["training"] = _for_training(found["implicit"]), begun["implicit"]
     singles = {ground: mujoco.MjData(model) for ground, model in found.items()}
     steps = round(case.window / found["none"].opt.timestep)
     timers: Timers = {
@@ -147,7 +147,7 @@ def _time(case: Case, rounds: int, report: Callable[[str], Any]) -> list[Timed]:
     ]
 
 
-def for_training(model: mujoco.MjModel) -> mujoco.MjModel:
+def _for_training(model: mujoco.MjModel) -> mujoco.MjModel:
     """A copy of a model whose implicit force is solved as exactly as training needs."""
     other = copy.copy(model)
     for bed in instances(other):

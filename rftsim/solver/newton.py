@@ -187,7 +187,10 @@ def _accept(p):
 
 @exact
 def _update(p, old, new):
-    """Broyden's rank-one update of each body's derivative from two points; what they did not foresee."""
+    """Broyden's rank-one update of each body's derivative from two points; what they did not foresee.
+
+    A new point within the tolerance is left by one short step more, for which the matrix that led to it will do.
+    """
     moved, twist, missed = doubles(stack_doubles(6), 6), doubles(stack_doubles(6), 6), doubles(stack_doubles(6), 6)
     for b in range(equation.head(p).nbody):
         twist_of(p, b, equation.velocity_of(p, new), moved)

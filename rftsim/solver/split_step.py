@@ -25,7 +25,7 @@ FINENESS: Final = 5.0
 SHALLOWEST: Final = 1e-4
 """Depth [m] below which none is resolved."""
 FIRST: Final = 3.9
-"""The same error of a first step in which a body moves by more than what is allowed: two parts."""
+"""What counts for that error in a first step in which a body moves by more than is allowed: two parts."""
 PART_COSTS: Final = 3.0
 """Evaluations' worth of a part, about."""
 MORE: Final = 2.0

@@ -12,8 +12,10 @@ import rftsim_envs
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from rftsim_envs import IDS, TASKS, ConfigError, SandEnv, SandVectorEnv
+from rftsim_envs.task import Config
 
 from rftsim import instances
+from rftsim.bench import environment
 
 VARIED = {"strength": (0.7, 1.5), "friction": (0.8, 1.0), "slope_deg": 5.0}
 
@@ -207,3 +209,8 @@ def test_a_thousand_random_episodes():
 
 def test_ids():
     assert tuple(f"rftsim/{name}-v0" for name in TASKS) == rftsim_envs.IDS
+
+
+def test_environments_train_with_the_tolerance_that_is_timed():
+    """What `rftsim bench environment` calls training is what an environment does unless told otherwise."""
+    assert Config().tolerance == environment.TRAINING

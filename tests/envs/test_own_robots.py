@@ -193,8 +193,8 @@ def test_weights_weigh(climber):
     """Each term is as large as its weight says; survival is paid per second."""
     told = []
     for factor in (1.0, 2.0):
-        weights = {"velocity": 1.0, "yaw": 0.5, "survival": 0.5, "energy": 0.2, "haste": 0.02, "tilt": 2.0}
-        weights["crouch"] = 3.0
+        weights = {"velocity": 1.0, "yaw": 0.5, "survival": 0.5, "energy": 0.2, "haste": 0.02}
+        weights |= {"tilt": 2.0, "crouch": 3.0}
         env = SandEnv("Locomotion", model=climber, **{name: factor * value for name, value in weights.items()})
         env.reset(seed=0)
         info = env.step(actions(env, 1)[0])[4]

@@ -133,7 +133,7 @@ class _Run:
         self.model = model
         formats: list[KVWriter] = [TensorBoardOutputFormat(str(folder.tensorboard))] if tensorboard else []
         self.model.set_logger(Logger(None, formats))
-        self._plan, self._callback = plan.training, _Callback()
+        self._training, self._callback = plan.training, _Callback()
         self._spent, self._saved = 0.0, (time.monotonic(), 0)
 
     @property
@@ -172,7 +172,7 @@ class _Run:
         """Collect n control steps of each simulation and learn from them; False where it was stopped."""
         began, self._callback.stop = time.monotonic(), stop
         self.model.n_steps = self.model.rollout_buffer.buffer_size = n
-        self.model.lr_schedule = ConstantSchedule(left * self._plan.learning_rate)
+        self.model.lr_schedule = ConstantSchedule(left * self._training.learning_rate)
         self._quieten(left)
         self.model.learn(n * self.env.num_envs, self._callback, NEVER, reset_num_timesteps=False)
         if self._callback.stopped:
@@ -202,7 +202,7 @@ class _Run:
 
     def _quieten(self, left: float) -> None:
         """Let the actions' deviation be at most what it may be with this share of the training left."""
-        first, last = self._plan.log_std_init, self._plan.log_std_last
+        first, last = self._training.log_std_init, self._training.log_std_last
         if last < first:
             self.model.policy.log_std.data.clamp_(max=left * first + (1.0 - left) * last)
 
