@@ -13,6 +13,13 @@ from rftsim_mpm.shapes import Shape
 Array = NDArray[np.float64]
 
 
+def speeding_up(velocity: Array, way: float) -> Callable[[float], tuple[Array, Array]]:
+    """Return the `steer` of a body that comes evenly from rest to a velocity [m/s] over a way [m], and does not spin."""
+    spin = np.zeros(1 if velocity.size == 2 else 3)
+    duration = 2.0 * way / float(np.linalg.norm(velocity))
+    return lambda time: (velocity if time >= duration else time / duration * velocity, spin)
+
+
 @dataclasses.dataclass
 class Body:
     """A shape with a motion, which infinite mass or inertia prescribes, along each axis on its own.

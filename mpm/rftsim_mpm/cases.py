@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rftsim_mpm.bed import level_bed
-from rftsim_mpm.body import Body
-from rftsim_mpm.errors import MpmError
+from rftsim_mpm.body import Body, speeding_up
+from rftsim_mpm.errors import MpmError, check_not_negative
 from rftsim_mpm.fields import Frame
 from rftsim_mpm.follow import Track, follow, part
 from rftsim_mpm.material import Material, stiffness
@@ -117,6 +117,8 @@ class Plates:
     """Size of a cell [m]; the source has 0.00125."""
     speed: float = 0.2
     """Speed of the plates, downward [m/s]; the source has 0.1."""
+    run_up: float = 0.005
+    """Way in which they evenly come to it, so that no jolt hides the first peak [m]."""
     mu_int: float = 0.4
     """Internal friction of the sand [-]."""
     mu_surf: float = 0.35
@@ -150,11 +152,13 @@ def plates(study: Plates, watch: Watch | None = None) -> PlatesForces:
     """Run case 2 of the source, the plates pushed down."""
     if len(study.lengths) < 2:
         raise MpmError("case 2 needs two or more lengths for its exponents")
+    check_not_negative(study, "run_up")
     count = len(study.lengths) + len(study.gaps)
     curves, pairs = [], []
     for i, length in enumerate(study.lengths):
         track = _push(study, [0.0], length, part(watch, i, count))
-        curves.append((track.time * study.speed, track.force[:, 0, 1]))
+        start = math.ceil(study.bed[1] / study.dx) * study.dx + 2.0 * study.dx
+        curves.append((start - track.position[:, 0, 1], track.force[:, 0, 1]))
     for i, gap in enumerate(study.gaps):
         offset = 0.5 * (1.0 + gap) * study.pair
         track = _push(study, [-offset, offset], study.pair, part(watch, len(study.lengths) + i, count))
@@ -174,9 +178,10 @@ def _push(study: Plates, offsets: list[float], length: float, watch: Watch | Non
     size = _whole_cells(study.bed, study.dx)
     shape, down = box(length, 4.0 * study.dx), np.array([0.0, -study.speed])
     places = [np.array([0.5 * size[0] + o, size[1] + 2.0 * study.dx]) for o in offsets]
-    bodies = [Body(shape, place, down, study.mu_surf) for place in places]
+    steer = speeding_up(down, study.run_up)
+    bodies = [Body(shape, place, np.zeros(2), study.mu_surf, steer=steer) for place in places]
     sim = _sim(material, size, study.dx, size[1] + study.depth + 8.0 * study.dx, bodies)
-    return follow(sim, study.depth / study.speed, watch)
+    return follow(sim, (study.depth + study.run_up) / study.speed, watch)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rftsim_mpm.bed import level_bed
-from rftsim_mpm.body import Body
+from rftsim_mpm.body import Body, speeding_up
 from rftsim_mpm.errors import MpmError
 from rftsim_mpm.material import Material
 from rftsim_mpm.reading import AVERAGE, FEWEST, History, Log, read
@@ -99,7 +99,7 @@ class Course:
         top = max(self.level, start[-1] + reach[-1], end + reach[-1]) + reach.max() + 2.0 * dx
         body = Body(
             self.shape, start, (0.0 if self.run_up else self.speed) * self.direction, self.friction, self.rotation,
-            steer=self._steer if self.run_up else None,
+            steer=speeding_up(self.speed * self.direction, self.run_up) if self.run_up else None,
         )  # fmt: skip
         filled = (*(n * dx for n in width), self.level)
         bed = level_bed(self.material, filled, dx, gravity=self.gravity, ppc=self.ppc)
@@ -121,11 +121,6 @@ class Course:
         layers[-1, 1] = 0.0
         layers[:-1, 0][np.array(self.mirrors)] = 0.0
         return layers
-
-    def _steer(self, time: float) -> tuple[Array, Array]:
-        """Velocity and spin of the body at a time [s]."""
-        speed = min(1.0, 0.5 * self.speed * time / self.run_up) * self.speed
-        return speed * self.direction, np.zeros(1 if self.shape.dim == 2 else 3)
 
     def run(self, watch: Watch | None = None) -> "Passage":
         """Move the body to a little beyond the reading.
