@@ -28,12 +28,20 @@ def _whole_cells(size: tuple[float, float], dx: float) -> tuple[float, float]:
 
 
 def _sim(
-    material: Material, size: tuple[float, float], dx: float, top: float, bodies: list[Body], phi: float | None = None
+    material: Material,
+    size: tuple[float, float],
+    dx: float,
+    top: float,
+    bodies: list[Body],
+    phi: float | None = None,
+    absorb: float = 0.0,
 ) -> Simulation:
     """Bodies in a level bed of the initial packing `phi`, the box's walls at `top` and as rough as the bodies."""
     bed = level_bed(material, size, dx, gravity=GRAVITY, phi=phi)
-    friction = bodies[0].friction
-    sim = Simulation(material, bed, dx, (size[0], top), bodies=bodies, gravity=GRAVITY, wall_friction=friction)
+    friction, layers = bodies[0].friction, np.array([[absorb, absorb], [absorb, 0.0]])
+    sim = Simulation(
+        material, bed, dx, (size[0], top), bodies=bodies, gravity=GRAVITY, wall_friction=friction, absorb=layers
+    )
     sim.clear_bodies()
     return sim
 
@@ -117,8 +125,10 @@ class Plates:
     """Size of a cell [m]; the source has 0.00125."""
     speed: float = 0.2
     """Speed of the plates, downward [m/s]; the source has 0.1."""
-    run_up: float = 0.005
+    run_up: float = 0.01
     """Way in which they evenly come to it, so that no jolt hides the first peak [m]."""
+    absorb: float = 0.15
+    """Width of the layers before the floor and the walls in which waves die down [m]."""
     mu_int: float = 0.4
     """Internal friction of the sand [-]."""
     mu_surf: float = 0.35
@@ -135,7 +145,7 @@ class PlatesForces(NamedTuple):
     curves: list[tuple[Array, Array]]
     """Depth [m] and force [N/m] of each single plate."""
     peak: Array
-    """First peak, the highest force above L/5 [N/m]."""
+    """First peak, the highest force above L/6 [N/m]."""
     deep: Array
     """Mean over the last quarter of the way [N/m]."""
     peak_exponent: float
@@ -152,7 +162,7 @@ def plates(study: Plates, watch: Watch | None = None) -> PlatesForces:
     """Run case 2 of the source, the plates pushed down."""
     if len(study.lengths) < 2:
         raise MpmError("case 2 needs two or more lengths for its exponents")
-    check_not_negative(study, "run_up")
+    check_not_negative(study, "run_up", "absorb")
     count = len(study.lengths) + len(study.gaps)
     curves, pairs = [], []
     for i, length in enumerate(study.lengths):
@@ -165,7 +175,7 @@ def plates(study: Plates, watch: Watch | None = None) -> PlatesForces:
         last = track.after(0.75 * track.time[-1])
         pairs.append(float(last.force[:, :, 1].mean()))
     lengths = np.array(study.lengths)
-    peak = np.array([f[z < length / 5.0].max() for length, (z, f) in zip(lengths, curves, strict=True)])
+    peak = np.array([f[z < length / 6.0].max() for length, (z, f) in zip(lengths, curves, strict=True)])
     deep = np.array([f[z > 0.75 * study.depth].mean() for z, f in curves])
     slopes = [float(np.polyfit(np.log(lengths), np.log(f), 1)[0]) for f in (peak, deep)]
     return PlatesForces(curves, peak, deep, slopes[0], slopes[1], np.array(pairs), track.frames[-1])
@@ -180,7 +190,7 @@ def _push(study: Plates, offsets: list[float], length: float, watch: Watch | Non
     places = [np.array([0.5 * size[0] + o, size[1] + 2.0 * study.dx]) for o in offsets]
     steer = speeding_up(down, study.run_up)
     bodies = [Body(shape, place, np.zeros(2), study.mu_surf, steer=steer) for place in places]
-    sim = _sim(material, size, study.dx, size[1] + study.depth + 8.0 * study.dx, bodies)
+    sim = _sim(material, size, study.dx, size[1] + study.depth + 8.0 * study.dx, bodies, absorb=study.absorb)
     return follow(sim, (study.depth + study.run_up) / study.speed, watch)
 
 

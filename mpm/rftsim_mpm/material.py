@@ -1,8 +1,11 @@
-"""Sand as a frictional continuum: the non-dilatant (NDPM) and the dilatant (DPM) plasticity model.
+"""Sand as a frictional continuum: the non-dilatant (NDPM) and the dilatant (DPM) plasticity model, and mu(I).
 
-Both are Drucker-Prager without cohesion: elastic while tau <= mu p, flowing along tau = mu p, and free of stress
+The two are Drucker-Prager without cohesion: elastic while tau <= mu p, flowing along tau = mu p, and free of stress
 wherever the sand has opened, rho < rho_c. In plane strain without dilatancy this is Mohr-Coulomb with sin(phi) = mu,
 not tan(phi) = mu: where the sand flows, the stress across the plane is the mean of the two in it.
+
+Neither has a length of its own: what flows without dilating gathers in bands as thin as cells let it. With mu(I) the
+friction of NDPM grows with the rate of shear, so that bands which thin out get stronger.
 """
 
 import dataclasses
@@ -33,24 +36,35 @@ class Material:
     """Slope of friction and dilatancy against packing fraction [-]."""
     phi_min: float = 0.45
     """Packing fraction below which no connected state exists [-]."""
+    mu_2: float | None = None
+    """Friction of the fastest flow, mu(I) = mu + (mu_2 - mu) / (1 + I_0 / I) with the inertial number I = gamma' d
+    sqrt(rho_g / p) of a shear rate gamma' [Jop, Forterre and Pouliquen 2006]; None where friction knows no rate."""
+    i_0: float = 0.279
+    """I_0 of mu(I) [-]: that of glass beads there."""
+    grain: float = 1e-3
+    """Diameter d of the grains in mu(I) [m]."""
 
     def __post_init__(self) -> None:
         if not self.mu > 0.0:
             raise MpmError(f"mu must be positive, not {self.mu:g}")
-        check_positive(self, "rho_g", "phi_c", "young")
+        check_positive(self, "rho_g", "phi_c", "young", "i_0", "grain")
         if not 0.0 <= self.poisson < 0.5:
             raise MpmError(f"poisson must be in [0, 0.5), not {self.poisson:g}")
         if not (math.isfinite(self.chi) and self.chi >= 0.0):
             raise MpmError(f"chi must be zero (no dilatancy) or positive, not {self.chi:g}")
         if not 0.0 < self.phi_min < self.phi_c < 1.0:
             raise MpmError(f"0 < phi_min < phi_c < 1 is needed, not phi_min {self.phi_min:g}, phi_c {self.phi_c:g}")
+        if self.mu_2 is not None and not (self.mu < self.mu_2 < math.inf and self.chi == 0.0):
+            raise MpmError(f"mu_2 must be above mu, and finite, and chi zero, not {self.mu_2:g} with chi {self.chi:g}")
 
     @classmethod
-    def of_density(cls, mu: float, rho_c: float, young: float = 1e6) -> "Material":
-        """Return NDPM sand of critical density rho_c [kg/m^3]."""
+    def of_density(
+        cls, mu: float, rho_c: float, young: float = 1e6, mu_2: float | None = None, grain: float = 1e-3
+    ) -> "Material":
+        """Return NDPM sand of critical density rho_c [kg/m^3], or sand of mu(I)."""
         if not (math.isfinite(rho_c) and rho_c > 0.0):
             raise MpmError(f"rho must be positive and finite, not {rho_c:g}")
-        return cls(mu=mu, rho_g=rho_c / 0.6, phi_c=0.6, young=young)
+        return cls(mu=mu, rho_g=rho_c / 0.6, phi_c=0.6, young=young, mu_2=mu_2, grain=grain)
 
     @property
     def rho_c(self) -> float:
@@ -72,10 +86,15 @@ class Material:
         """Speed of compression waves at the critical density [m/s]."""
         return math.sqrt((self.bulk + 4.0 / 3.0 * self.shear) / self.rho_c)
 
-    @property
-    def constants(self) -> tuple[float, ...]:
-        """Parameters as the compiled loops take them: K, G, mu, phi_c, chi, ln(phi_min)."""
-        return self.bulk, self.shear, self.mu, self.phi_c, self.chi, math.log(self.phi_min)
+    def constants(self, dt: float) -> tuple[float, ...]:
+        """Parameters as the compiled loops take them for steps of dt [s].
+
+        They are K, G, mu, phi_c, chi, ln(phi_min), mu_2 - mu, and the shear stress by which a step relaxes at a shear
+        rate of I_0, over the root of the pressure [Pa^0.5].
+        """
+        rise = 0.0 if self.mu_2 is None else self.mu_2 - self.mu
+        relaxed = self.shear * dt * self.i_0 / (self.grain * math.sqrt(self.rho_g))
+        return self.bulk, self.shear, self.mu, self.phi_c, self.chi, math.log(self.phi_min), rise, relaxed
 
 
 def bearing_factor(phi: float) -> float:
@@ -114,6 +133,25 @@ def return_map(p, tau, mu, alpha):
 
 
 @njit(fastmath=FASTMATH, error_model="numpy", inline="always")
+def inertial_shear(p, tau, mu, rise, relaxed):
+    """Return the shear stress of mu(I) at the end of a step, from a trial one above mu p [Pa].
+
+    It solves tau' = (mu + rise / (1 + I_0 / I)) p with the I of the step's own flow, (tau - tau') / (G dt)
+    [Dunatunga and Kamrin 2015].
+
+    Args:
+        p: Pressure [Pa].
+        tau: Trial equivalent shear stress [Pa].
+        mu: Friction at rest [-].
+        rise: mu_2 - mu [-].
+        relaxed: The last of `Material.constants` [Pa^0.5].
+    """
+    slow, fast, step = mu * p, (mu + rise) * p, relaxed * np.sqrt(p)
+    total, product = fast + tau + step, fast * tau + slow * step
+    return 2.0 * product / (total + np.sqrt(total * total - 4.0 * product))
+
+
+@njit(fastmath=FASTMATH, error_model="numpy", inline="always")
 def flow(theta, theta_d, tau, constants):
     """Return what becomes of a trial stress: elastic, on the yield line, or none.
 
@@ -129,7 +167,7 @@ def flow(theta, theta_d, tau, constants):
     Returns:
         Factor on the trial deviator, pressure [Pa], increment of plastic shear [-], new theta_d.
     """
-    bulk, shear, mu, phi_c, chi, theta_min = constants
+    bulk, shear, mu, phi_c, chi, theta_min, rise, relaxed = constants
     if mu == np.inf:
         return 1.0, bulk * (theta - theta_d), 0.0, theta_d
     if theta < theta_d:
@@ -142,6 +180,8 @@ def flow(theta, theta_d, tau, constants):
     p, tau_new = return_map(bulk * (theta - theta_d), tau, mu + excess, bulk * excess / shear)
     if tau_new == tau:
         return 1.0, p, 0.0, theta_d
+    if rise > 0.0 and p > 0.0:
+        tau_new = inertial_shear(p, tau, mu, rise, relaxed)
     slip = (tau - tau_new) / shear
     return tau_new / tau, p, slip, theta_d - excess * slip
 

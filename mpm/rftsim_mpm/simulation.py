@@ -172,7 +172,7 @@ class Simulation:
         k.step(self._grid, self._shape, self.gravity, self.dt, self.wall_friction, self._flow, self.wall_impulse)
         k.gather(
             p.x, p.v, p.mass, p.volume, p.stress, p.theta, p.theta_d, p.strain, *grid, self._flow, self.dt,
-            self.material.constants,
+            self.material.constants(self.dt),
         )  # fmt: skip
         self.steps += 1
         self.time = self.steps * self.dt

@@ -52,6 +52,10 @@ class HeldWheel(Wheel):
     """If held, as in `Simulation` [s]."""
     dim: int = later(2)
     """2: plane strain; 3: in space, if held."""
+    mu_2: float | None = later(None)
+    """If held, mu_2 of mu(I), else no rate [-]."""
+    grain: float = later(1e-3)
+    """Diameter of grains of mu(I) [m]."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -179,9 +183,8 @@ def _prepared(study: HeldWheel) -> Simulation:
     behind, ahead = 0.5 * study.contact + 0.4 * outer, 0.5 * study.contact + before * outer
     length = math.ceil((behind + ahead + abs(speed) * study.time) / dx) * dx
     depth = math.ceil((study.sunk + below * outer) / dx) * dx
-    material = Material.of_density(
-        study.mu_int, study.rho, stiffness(study.rho, study.gravity, 0.3 * outer, study.mu_int)
-    )
+    young = stiffness(study.rho, study.gravity, 0.3 * outer, study.mu_int)
+    material = Material.of_density(study.mu_int, study.rho, young, study.mu_2, study.grain)
     level = depth - study.shift * dx
     start = behind if omega >= 0.0 else length - behind
     across = [] if study.dim == 2 else [math.ceil((0.5 * study.breadth + outer) / dx) * dx]

@@ -41,7 +41,7 @@ class Wheel:
     width: float = 0.006
     """Width of one along the rim [m]."""
     breadth: float = 0.14
-    """Breadth, which divides all forces [m]."""
+    """Breadth, divides all forces [m]."""
     mass_x: float = 23.0
     """Inertia along [kg]."""
     mass_z: float = 6.3
@@ -55,7 +55,7 @@ class Wheel:
     rho: float = 638.0
     """Critical density [kg/m^3]."""
     dx: float = 0.004
-    """Cell, less than a grouser's width [m]."""
+    """Cell, less than a grouser [m]."""
     xpic: int = 0
     """Order of XPIC; 0 is FLIP."""
     gravity: float = 9.81

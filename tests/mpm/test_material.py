@@ -7,7 +7,7 @@ import pytest
 from numba import njit
 from rftsim_mpm.bed import earth_pressure
 from rftsim_mpm.errors import MpmError
-from rftsim_mpm.material import Material, bearing_factor, respond_plane, respond_solid, return_map
+from rftsim_mpm.material import Material, bearing_factor, inertial_shear, respond_plane, respond_solid, return_map
 
 
 @njit
@@ -47,7 +47,7 @@ def start(material, pressure, phi=None):
 def test_biaxial(mu):
     """Plane strain under constant lateral stress fails at sigma_1 / sigma_3 = (1 + mu)/(1 - mu): sin phi = mu."""
     material = Material.of_density(mu, 1500.0, 1e6)
-    stress, *_ = _path((0.0, 0.0, 0.0, -2e-5), -100.0, 5000, *start(material, 100.0), material.constants)
+    stress, *_ = _path((0.0, 0.0, 0.0, -2e-5), -100.0, 5000, *start(material, 100.0), material.constants(1e-4))
     assert stress[0] == pytest.approx(-100.0, rel=1e-9)
     assert stress[2] / stress[0] == pytest.approx((1.0 + mu) / (1.0 - mu), rel=1e-4)
     assert stress[1] == pytest.approx(0.5 * (stress[0] + stress[2]), rel=1e-4)
@@ -57,8 +57,34 @@ def test_biaxial(mu):
 def test_simple_shear(mu):
     """At constant volume tau/sigma_n tends to mu, as the normal stresses turn equal."""
     material = Material.of_density(mu, 1500.0, 1e6)
-    stress, *_ = _path((0.0, 1e-5, 0.0, 0.0), 0.0, 20000, *start(material, 10.0), material.constants)
+    stress, *_ = _path((0.0, 1e-5, 0.0, 0.0), 0.0, 20000, *start(material, 10.0), material.constants(1e-4))
     assert stress[3] / -stress[2] == pytest.approx(mu, rel=1e-4)
+
+
+@pytest.mark.parametrize("rate", [0.01, 1.0, 100.0, 1000.0])
+def test_friction_grows_with_the_rate(rate):
+    """Simple shear at a rate tends to mu(I) = mu + (mu_2 - mu)/(1 + I_0/I), I = rate d sqrt(rho_g/p) [Jop 2006]."""
+    material, dt, pressure = Material.of_density(0.38, 1500.0, 1e6, mu_2=0.64, grain=5e-4), 1e-4, 50.0
+    stress, *_ = _path((0.0, rate * dt, 0.0, 0.0), 0.0, 40000, *start(material, pressure), material.constants(dt))
+    inertial = rate * material.grain * math.sqrt(material.rho_g / pressure)
+    expected = material.mu + (0.64 - material.mu) / (1.0 + material.i_0 / inertial)
+    assert stress[3] / -stress[2] == pytest.approx(expected, rel=2e-3)
+
+
+@pytest.mark.parametrize("tau", [1.001, 1.5, 40.0])
+def test_inertial_shear_is_that_of_its_own_flow(tau):
+    """The returned stress is mu(I) p for the I that the step's own plastic shear makes."""
+    p, mu, rise, shear, dt, grain, rho_g, i_0 = 80.0, 0.4, 0.26, 4e5, 2e-5, 1e-3, 2500.0, 0.279
+    trial = tau * mu * p
+    found = inertial_shear(p, trial, mu, rise, shear * dt * i_0 / (grain * math.sqrt(rho_g)))
+    inertial = (trial - found) / (shear * dt) * grain * math.sqrt(rho_g / p)
+    assert found == pytest.approx((mu + rise / (1.0 + i_0 / inertial)) * p, rel=1e-9)
+
+
+def test_mu_of_i_needs_a_faster_friction_and_no_dilatancy():
+    for bad in ({"mu_2": 0.3}, {"mu_2": math.inf}, {"mu_2": 0.6, "chi": 2.5}, {"mu_2": 0.6, "grain": 0.0}):
+        with pytest.raises(MpmError, match="mu_2|grain"):
+            Material(0.4, **bad)
 
 
 @pytest.mark.parametrize("phi_0", [0.57, 0.63])
@@ -67,7 +93,7 @@ def test_dilatancy_in_closed_form(phi_0):
     phi_c, chi = 0.6, 5.0
     material = Material(0.4, phi_c=phi_c, chi=chi, young=1e8)
     stress, theta, theta_d = start(material, 5000.0, phi_0)
-    _, _, theta_d, gamma = _path((0.0, 5e-5, 0.0, 0.0), 1.0, 10000, stress, theta, theta_d, material.constants)
+    _, _, theta_d, gamma = _path((0.0, 5e-5, 0.0, 0.0), 1.0, 10000, stress, theta, theta_d, material.constants(1e-4))
     expected = phi_c / (1.0 + (phi_c / phi_0 - 1.0) * math.exp(-chi * phi_c * gamma))
     assert gamma > 0.45
     assert math.exp(theta_d) == pytest.approx(expected, rel=1e-4)
@@ -86,7 +112,7 @@ def test_dilatant_pressure_follows_the_density_of_the_dense_state():
     """The return map's pressure is K ln(rho / (phi_d rho_g)) with the phi_d that it returns, to round-off."""
     material = Material(0.4, phi_c=0.6, chi=5.0, young=1e7)
     stress, theta, theta_d = start(material, 5000.0, 0.62)
-    stress, theta, theta_d, _ = _path((0.0, 1e-4, 0.0, 0.0), 0.0, 500, stress, theta, theta_d, material.constants)
+    stress, theta, theta_d, _ = _path((0.0, 1e-4, 0.0, 0.0), 0.0, 500, stress, theta, theta_d, material.constants(1e-4))
     assert -sum(stress[:3]) / 3.0 == pytest.approx(material.bulk * (theta - theta_d), rel=1e-9)
     assert theta_d < math.log(0.62)
 
@@ -101,7 +127,7 @@ def test_dilatancy_needs_chi():
     for lxx, lxz, lzx, lzz in walk:
         states = [
             (lambda out, theta: (out[0], theta, out[2]))(
-                respond_plane(stress, theta - lxx - lzz, theta_d, lxx, lxz, lzx, lzz, material.constants),
+                respond_plane(stress, theta - lxx - lzz, theta_d, lxx, lxz, lzx, lzz, material.constants(1e-4)),
                 theta - lxx - lzz,
             )
             for material, (stress, theta, theta_d) in zip((plain, dilatant), states, strict=True)
@@ -137,14 +163,40 @@ def test_plane_strain_is_the_solid_without_the_third_axis():
         xx, yy, zz, xz = rng.normal(scale=100.0, size=4) - np.array([1000.0, 1000.0, 1000.0, 0.0])
         theta_d = math.log(0.61)
         theta = theta_d + 1000.0 / material.bulk
-        plane, slip, dense = respond_plane((xx, yy, zz, xz), theta, theta_d, lxx, lxz, lzx, lzz, material.constants)
+        plane, slip, dense = respond_plane(
+            (xx, yy, zz, xz), theta, theta_d, lxx, lxz, lzx, lzz, material.constants(1e-4)
+        )
         solid, slip3, dense3 = respond_solid(
-            (xx, yy, zz, 0.0, xz, 0.0), theta, theta_d, lxx, 0.0, lxz, 0.0, 0.0, 0.0, lzx, 0.0, lzz, material.constants
+            (xx, yy, zz, 0.0, xz, 0.0),
+            theta,
+            theta_d,
+            lxx,
+            0.0,
+            lxz,
+            0.0,
+            0.0,
+            0.0,
+            lzx,
+            0.0,
+            lzz,
+            material.constants(1e-4),
         )
         np.testing.assert_allclose((*plane, slip, dense), (*solid[:3], solid[4], slip3, dense3), rtol=1e-9, atol=1e-9)
         assert solid[3] == solid[5] == 0.0
         turned, slip_t, _ = respond_solid(  # x -> y -> z -> x
-            (zz, xx, yy, 0.0, 0.0, xz), theta, theta_d, lzz, lzx, 0.0, lxz, lxx, 0.0, 0.0, 0.0, 0.0, material.constants
+            (zz, xx, yy, 0.0, 0.0, xz),
+            theta,
+            theta_d,
+            lzz,
+            lzx,
+            0.0,
+            lxz,
+            lxx,
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+            material.constants(1e-4),
         )
         np.testing.assert_allclose((turned[1], turned[2], turned[0], turned[5]), plane, rtol=1e-9, atol=1e-9)
         assert slip_t == pytest.approx(slip, rel=1e-9, abs=1e-15)
@@ -157,7 +209,7 @@ def test_jaumann_rotates_the_stress():
         turn = 0.5 * math.pi / steps
         stress, theta = (-300.0, -200.0, -100.0, 0.0), math.log(0.6) + 200.0 / material.bulk
         for _ in range(steps):
-            stress, _, _ = respond_plane(stress, theta, math.log(0.6), 0.0, turn, -turn, 0.0, material.constants)
+            stress, _, _ = respond_plane(stress, theta, math.log(0.6), 0.0, turn, -turn, 0.0, material.constants(1e-4))
         error = abs(stress[0] + 100.0)
         assert error < 400.0 * math.pi**2 / steps
     assert stress[1] == pytest.approx(-200.0)
