@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 
 def speeding_up(velocity: Array, way: float) -> Callable[[float], tuple[Array, Array]]:
-    """Return the `steer` of a body that comes evenly from rest to a velocity [m/s] over a way [m], and does not spin."""
+    """Return the `steer` of a body that comes evenly from rest to a velocity [m/s] over a way [m], without spin."""
     spin = np.zeros(1 if velocity.size == 2 else 3)
     duration = 2.0 * way / float(np.linalg.norm(velocity))
     return lambda time: (velocity if time >= duration else time / duration * velocity, spin)
