@@ -38,7 +38,7 @@ class Material:
     """Packing fraction below which no connected state exists [-]."""
     mu_2: float | None = None
     """Friction of the fastest flow, mu(I) = mu + (mu_2 - mu) / (1 + I_0 / I) with the inertial number I = gamma' d
-    sqrt(rho_g / p) of a shear rate gamma' [Jop, Forterre and Pouliquen 2006]; None where friction knows no rate."""
+    sqrt(rho_g / p) of a shear rate gamma' [Jop2006]; None where friction knows no rate."""
     i_0: float = 0.279
     """I_0 of mu(I) [-]: that of glass beads there."""
     grain: float = 1e-3
@@ -137,7 +137,7 @@ def inertial_shear(p, tau, mu, rise, relaxed):
     """Return the shear stress of mu(I) at the end of a step, from a trial one above mu p [Pa].
 
     It solves tau' = (mu + rise / (1 + I_0 / I)) p with the I of the step's own flow, (tau - tau') / (G dt)
-    [Dunatunga and Kamrin 2015].
+    [Dunatunga2015].
 
     Args:
         p: Pressure [Pa].

@@ -76,6 +76,10 @@ class Plate:
     """Travel in which it speeds up [lengths]."""
     absorb: float = later(0.0)
     """Edge that absorbs waves [lengths]."""
+    mu_2: float | None = later(None)
+    """mu_2 of mu(I), else no rate [-]."""
+    grain: float = later(1e-3)
+    """Diameter of grains of mu(I) [m]."""
 
     def __post_init__(self) -> None:
         if self.dim not in (2, 3):
@@ -132,7 +136,7 @@ class Plate:
     def material(self) -> Material:
         """Parameters of the sand; Young's modulus, if not given, from the softness at the reading's depth."""
         young = self.young or stiffness(self.rho, 9.81, self.z, self.mu_int, self.softness)
-        return Material.of_density(self.mu_int, self.rho, young)
+        return Material.of_density(self.mu_int, self.rho, young, self.mu_2, self.grain)
 
     @property
     def direction(self) -> Array:

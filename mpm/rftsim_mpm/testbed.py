@@ -17,6 +17,7 @@ from rftsim_mpm.fields import Frame
 from rftsim_mpm.follow import follow
 from rftsim_mpm.material import Material, stiffness
 from rftsim_mpm.reading import averaged
+from rftsim_mpm.rim import Rim
 from rftsim_mpm.settings import later
 from rftsim_mpm.shapes import Shape, drum, extruded
 from rftsim_mpm.simulation import SPACING, Simulation, Watch
@@ -34,6 +35,8 @@ ROOM = ((0.5, 1.0), (1.2, 1.8))
 """Sand below and ahead of a held wheel, and of one that sinks under its load, which shears and shoves more [radii]."""
 SPARSE = 0.5
 """Distance between the points of a wheel in space [cells]: it has many, and more make no difference."""
+LOOK_EVERY = 10
+"""Steps between looks at the pressure on the rim."""
 PITCHES = 20
 """Pitches of a wheel without grousers: turns of a twentieth are what its noise is told from."""
 
@@ -118,6 +121,8 @@ class Held(NamedTuple):
     """Standard errors of these, from the means over single pitches of the grousers."""
     sinking: float
     """By how much it goes on sinking in the time of the means [m]."""
+    rear: float
+    """How far below the level surface the sand leaves the rim behind, where the pressure vanishes [m]."""
     time: Array
     """Times of the whole run, (n,) [s]."""
     forces: Array
@@ -137,7 +142,8 @@ class Held(NamedTuple):
         """The means as JSON has them, by name and unit."""
         names = "load_N_m", "drawbar_N_m", "torque_N", "sinkage_m"
         noises = (f"{name}_noise" for name in names)
-        return {**dict(zip((*names, *noises), (*self.means, *self.noise), strict=True)), "sinking_m": self.sinking}
+        means = dict(zip((*names, *noises), (*self.means, *self.noise), strict=True))
+        return {**means, "sinking_m": self.sinking, "rear_m": self.rear}
 
 
 def hold(study: HeldWheel, watch: Watch | None = None) -> Held:
@@ -154,20 +160,29 @@ def hold(study: HeldWheel, watch: Watch | None = None) -> Held:
         raise MpmError(f"half of {study.time:g} s must hold two pitches of {pitch:g} s: a longer duration, or more rpm")
     sim = _prepared(study)
     first = sim.bodies[0].position[-1]
-    track = follow(sim, study.time, watch)
     way = math.copysign(1.0, study.rpm)
+    rim, first_read = Rim(way), study.time - count * pitch
+
+    def look(sim: Simulation, share: float) -> None:
+        if sim.time >= first_read and sim.steps % LOOK_EVERY == 0:
+            rim.look(sim)
+        if watch is not None:
+            watch(sim, share)
+
+    track = follow(sim, study.time, look)
     torque = track.moment[:, 0, 0 if study.dim == 2 else 1]
     forces = np.column_stack([track.force[:, 0, -1], way * track.force[:, 0, 0], -way * torque])
     if study.dim == 3:
         forces *= 2.0 / study.breadth
     sinkages = _first_sinkage(study) + first - track.position[:, 0, -1]
-    late = track.time >= study.time - count * pitch
+    late = track.time >= first_read
     table = np.column_stack([forces, sinkages])[late]
     parts = np.array([part.mean(axis=0) for part in np.array_split(table, count)])
     noise = parts.std(axis=0, ddof=1) / math.sqrt(count)
     sinking = count * pitch * float(np.polyfit(track.time[late], sinkages[late], 1)[0])
     means = tuple(parts.mean(axis=0).tolist())
-    return Held(means, tuple(noise.tolist()), sinking, track.time, forces, sinkages, track.frames[-1])
+    rear = means[3] - study.outer * (1.0 - math.cos(rim.rear))
+    return Held(means, tuple(noise.tolist()), sinking, rear, track.time, forces, sinkages, track.frames[-1])
 
 
 def _first_sinkage(study: HeldWheel) -> float:

@@ -56,15 +56,27 @@ def jobs(request: Request) -> dict[str, Callable[[], Any]]:
 def _read(results: Results) -> list[dict[str, float]]:
     kept = ("prescribed_slip", "grousers", "mu_int", "dx", "shift")
     names = (*FORCES, *(f"{name}_noise" for name in FORCES))
-    return [{n: one["heldwheel"][n] for n in kept} | {n: one[n] for n in names} for one in results]
+    return [
+        {n: one["heldwheel"][n] for n in kept}
+        | {"mu_2": one["heldwheel"].get("mu_2") or one["heldwheel"]["mu_int"]}
+        | {n: one[n] for n in names}
+        for one in results
+    ]
 
 
 def _read_loaded(results: Results) -> list[dict[str, float]]:
     names = ("sinkage_m", "drawbar_N_m", "torque_N", "sinking_m")
     return [
-        {n: one["heldwheel"][n] for n in ("prescribed_slip", "dx")} | {n: one[n] for n in names}
+        {n: one["heldwheel"][n] for n in ("prescribed_slip", "dx", "rpm")}
+        | {n: one[n] for n in names}
+        | {"rear_m": one.get("rear_m", math.nan)}
         for one in sorted(results, key=lambda one: (-one["heldwheel"]["dx"], one["heldwheel"]["prescribed_slip"]))
     ]
+
+
+def _at_one_rate(measured: Measured) -> list[dict[str, float]]:
+    """The wheels under their load that turn as fast as those at a sinkage."""
+    return [one for one in outcome(measured, "loaded") or [] if one["rpm"] == HeldWheel.rpm]
 
 
 def _at_load(law: str, slip: float) -> dict[str, float]:
@@ -97,12 +109,16 @@ def _law(law: str, slip: float, sinkage: float) -> dict[str, float]:
 def rows(measured: Measured) -> list[Row]:
     """The rows of the laws against the continuum, and of the continuum against finer cells of its own."""
     table = outcome(measured, "held") or []
-    return [*_law_rows(measured, table), *_cell_rows(table), *_loaded_rows(measured)]
+    return [*_law_rows(measured, table), *_cell_rows(table), *_loaded_rows(measured), *_rear_rows(measured)]
 
 
 def _over_slip(table: list[dict[str, float]]) -> list[dict[str, float]]:
-    own = [one for one in table if one["grousers"] and one["dx"] == CELL and one["mu_int"] == POPPY.mu_int]
-    return sorted(own, key=lambda one: one["prescribed_slip"])
+    return sorted((o for o in _on_poppy_seeds(table) if o["dx"] == CELL), key=lambda o: o["prescribed_slip"])
+
+
+def _on_poppy_seeds(table: list[dict[str, float]]) -> list[dict[str, float]]:
+    """Wheels with grousers on sand of the poppy seeds' friction, which knows no rate."""
+    return [o for o in table if o["grousers"] and o["mu_int"] == o["mu_2"] == POPPY.mu_int]
 
 
 def _law_rows(measured: Measured, table: list[dict[str, float]]) -> list[Row]:
@@ -117,7 +133,7 @@ def _law_rows(measured: Measured, table: list[dict[str, float]]) -> list[Row]:
 
 def _loaded_rows(measured: Measured) -> list[Row]:
     """The rows of the dynamic law over the slip at a load, to be read, and of the continuum's finer cells."""
-    table = outcome(measured, "loaded") or []
+    table = _at_one_rate(measured)
     coarse = {one["prescribed_slip"]: one for one in table if one["dx"] == CELL}
     rows = []
     for one in table:
@@ -133,18 +149,32 @@ def _loaded_rows(measured: Measured) -> list[Row]:
     return rows
 
 
+def _rear_rows(measured: Measured) -> list[Row]:
+    """The rows of where the sand leaves the rim behind, over the rate: delta h of [Agarwal] section 4.6.2."""
+    table = [one for one in outcome(measured, "loaded") or [] if not math.isnan(one["rear_m"])]
+    rows = []
+    for one in sorted(table, key=lambda one: one["rpm"]):
+        omega = one["rpm"] * 2.0 * math.pi / 60.0
+        drop = 1e3 * min(GROUSER_WHEEL.outer_radius**2 * omega**2 / POPPY.g, one["sinkage_m"])
+        said = f"drop behind, {one['rpm']:g} RPM, slip {one['prescribed_slip']:g}: at most the sinkage"
+        note = f"sinkage of the continuum's {1e3 * one['sinkage_m']:.1f} mm"
+        rows.append(Row(said, drop, "our continuum", "mm", expected=1e3 * one["rear_m"], note=note))
+    return rows
+
+
 def _cell_rows(table: list[dict[str, float]]) -> list[Row]:
     """The rows of each run against that of the next larger cells, or of the same half a cell aside."""
     rows = []
-    for grousers in sorted({one["grousers"] for one in table}):
-        for mu in sorted({one["mu_int"] for one in table}):
-            own = [o for o in table if (o["grousers"], o["mu_int"], o["prescribed_slip"]) == (grousers, mu, 0.3)]
-            for before, after, how in _pairs(own):
-                what = f"continuum, {'wheel' if grousers else 'disc'}, μ_int {mu:g}, {how}"
-                for said, got, expected, unit, size in _compared(after, before):
-                    note = NOTE if abs(got - expected) > CONVERGED * size else ""
-                    within = CONVERGED * size
-                    rows.append(near(f"{what}: {said}", got, expected, within, "itself before", unit=unit, note=note))
+    for grousers, mu, mu_2 in sorted({(one["grousers"], one["mu_int"], one["mu_2"]) for one in table}):
+        wanted = (grousers, mu, mu_2, 0.3)
+        own = [o for o in table if (o["grousers"], o["mu_int"], o["mu_2"], o["prescribed_slip"]) == wanted]
+        sand = f"μ_int {mu:g}" if mu_2 == mu else f"μ(I) from {mu:g} to {mu_2:g}"
+        for before, after, how in _pairs(own):
+            what = f"continuum, {'wheel' if grousers else 'disc'}, {sand}, {how}"
+            for said, got, expected, unit, size in _compared(after, before):
+                within = CONVERGED * size
+                note = NOTE if mu_2 == mu and abs(got - expected) > within else ""
+                rows.append(near(f"{what}: {said}", got, expected, within, "itself before", unit=unit, note=note))
     return rows
 
 
@@ -188,7 +218,7 @@ def _draw_held(measured: Measured, axes: Any) -> None:
                 [one[column] for one in coarse] for column in ("prescribed_slip", name, f"{name}_noise")
             )
             axis.errorbar(slip, force, noise, fmt="ko", capsize=3, label=f"continuum, cells {1e3 * CELL:g} mm")
-        finer = [one for one in table if one["grousers"] and one["mu_int"] == POPPY.mu_int and one["dx"] < CELL]
+        finer = [one for one in _on_poppy_seeds(table) if one["dx"] < CELL]
         for one, mark in zip(sorted((o for o in finer if not o["shift"]), key=lambda o: -o["dx"]), "v^", strict=False):
             axis.plot(one["prescribed_slip"], one[name], f"C3{mark}", label=f"{1e3 * one['dx']:.3g} mm")
         for law, line in zip(LAWS, ("--", "-"), strict=True):
@@ -197,7 +227,7 @@ def _draw_held(measured: Measured, axes: Any) -> None:
 
 
 def _draw_loaded(measured: Measured, axes: Any) -> None:
-    table = outcome(measured, "loaded") or []
+    table = _at_one_rate(measured)
     names = {"sinkage_m": "sinkage [m]", "drawbar_N_m": "drawbar [N/m]", "torque_N": "torque [N]"}
     for axis, (name, said) in zip(axes, names.items(), strict=True):
         for dx, mark in zip(sorted({one["dx"] for one in table}, reverse=True), ("ko", "C3v"), strict=False):

@@ -63,7 +63,7 @@ def test_simple_shear(mu):
 
 @pytest.mark.parametrize("rate", [0.01, 1.0, 100.0, 1000.0])
 def test_friction_grows_with_the_rate(rate):
-    """Simple shear at a rate tends to mu(I) = mu + (mu_2 - mu)/(1 + I_0/I), I = rate d sqrt(rho_g/p) [Jop 2006]."""
+    """Simple shear at a rate tends to mu(I) = mu + (mu_2 - mu)/(1 + I_0/I), I = rate d sqrt(rho_g/p) [Jop2006]."""
     material, dt, pressure = Material.of_density(0.38, 1500.0, 1e6, mu_2=0.64, grain=5e-4), 1e-4, 50.0
     stress, *_ = _path((0.0, rate * dt, 0.0, 0.0), 0.0, 40000, *start(material, pressure), material.constants(dt))
     inertial = rate * material.grain * math.sqrt(material.rho_g / pressure)

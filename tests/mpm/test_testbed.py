@@ -1,10 +1,12 @@
 """A wheel held at a slip and a sinkage: what is prescribed, mirror symmetry, and convergence as a long study."""
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from rftsim_mpm.errors import MpmError
+from rftsim_mpm.rim import Rim
 from rftsim_mpm.testbed import HeldWheel, hold
 
 QUICK = HeldWheel(grousers=0, prescribed_slip=0.3, prescribed_sinkage=0.02, dx=0.006, rpm=120.0, duration=0.11)
@@ -32,6 +34,26 @@ def test_a_wheel_that_turns_the_other_way_feels_the_same(grousers):
     study = dataclasses.replace(QUICK, grousers=grousers, dx=0.005)
     found, mirrored = (hold(dataclasses.replace(study, rpm=rpm)) for rpm in (120.0, -120.0))
     np.testing.assert_allclose(mirrored.means, found.means, rtol=1e-6)
+    assert mirrored.rear == pytest.approx(found.rear, abs=1e-4)
+    assert 0.0 < found.rear <= found.means[3]
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+@pytest.mark.parametrize("ends", [(-40.0, 20.0), (-60.0, -10.0)])
+def test_the_rim_is_left_where_the_pressure_vanishes(way, ends):
+    """A disc that is pressed from 40 degrees ahead to 20 behind is left 20 degrees behind, however it has turned."""
+    rim, angle = Rim(way), np.radians(np.arange(0.25, 360.0, 0.5))
+    rng = np.random.default_rng(0)
+    for turn in rng.uniform(0.0, 2.0 * np.pi, 20):
+        c, s = np.cos(turn), np.sin(turn)
+        radial = np.column_stack([np.sin(angle), np.cos(angle)])
+        world = radial @ np.array([[c, s], [-s, c]]).T
+        behind = np.degrees(np.arctan2(-way * world[:, 0], -world[:, 1]))
+        pressure = np.where((behind > ends[0]) & (behind < ends[1]), 100.0, 0.0)
+        surface = SimpleNamespace(points=0.1 * radial, areas=np.full(len(angle), 1e-3))
+        body = SimpleNamespace(rotation=np.array([[c, s], [-s, c]]))
+        rim.look(SimpleNamespace(bodies=[body], surfaces=[surface], traction=[pressure[:, None] * radial]))
+    assert np.degrees(rim.rear) == pytest.approx(ends[1], abs=3.1)
 
 
 def test_a_wheel_under_its_load_sinks_until_the_sand_bears_it():
