@@ -25,17 +25,17 @@ class Rim:
     def __init__(self, way: float) -> None:
         self.way = way
         self.pressed = np.zeros(BINS)
-        """Radial force of each part of the rim, from straight up over the rear to straight up, (BINS,); summed up."""
+        """Pressure of each part times its area, from straight up over the front, down, and up behind, (BINS,).
+
+        That on the sides of grousers counts, too."""
 
     def look(self, sim: Simulation) -> None:
         """Add the pressure of the moment, of the simulation's first body."""
         body, surface = sim.bodies[0], sim.surfaces[0]
-        arm, stress = surface.points @ body.rotation.T, sim.traction[0] @ body.rotation.T
-        radius = np.hypot(arm[:, 0], arm[:, -1])
-        radial = (stress[:, 0] * arm[:, 0] + stress[:, -1] * arm[:, -1]) / np.maximum(radius, 1e-12)
+        arm, pressure = surface.points @ body.rotation.T, (sim.traction[0] * surface.normals).sum(axis=1)
         place = np.arctan2(-self.way * arm[:, 0], -arm[:, -1]) / (2.0 * math.pi) + 0.5
         index = np.minimum((place * BINS).astype(int), BINS - 1)
-        self.pressed += np.bincount(index, radial * surface.areas, BINS)
+        self.pressed += np.bincount(index, pressure * surface.areas, BINS)
 
     @property
     def rear(self) -> float:

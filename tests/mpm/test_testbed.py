@@ -50,7 +50,7 @@ def test_the_rim_is_left_where_the_pressure_vanishes(way, ends):
         world = radial @ np.array([[c, s], [-s, c]]).T
         behind = np.degrees(np.arctan2(-way * world[:, 0], -world[:, 1]))
         pressure = np.where((behind > ends[0]) & (behind < ends[1]), 100.0, 0.0)
-        surface = SimpleNamespace(points=0.1 * radial, areas=np.full(len(angle), 1e-3))
+        surface = SimpleNamespace(points=0.1 * radial, normals=radial, areas=np.full(len(angle), 1e-3))
         body = SimpleNamespace(rotation=np.array([[c, s], [-s, c]]))
         rim.look(SimpleNamespace(bodies=[body], surfaces=[surface], traction=[pressure[:, None] * radial]))
     assert np.degrees(rim.rear) == pytest.approx(ends[1], abs=3.1)

@@ -125,7 +125,7 @@ class CaseThree(StudyCommand[Plowing, PlowingForces]):
 
     def _lines(self, study: Plowing, found: PlowingForces) -> list[str]:
         return [
-            f"packing {phi:g}: mean drag {mean:.0f} N/m, fluctuation {100 * part:.1f} %"
+            f"packing {phi:g}: mean drag {mean:.0f} N/m, fluctuation {mean * part:.1f} N/m, {100 * part:.1f} %"
             for phi, mean, part in zip(study.packings, found.mean, found.fluctuation, strict=True)
         ]
 

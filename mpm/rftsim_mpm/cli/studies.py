@@ -79,6 +79,7 @@ class WheelCommand(StudyCommand[HeldWheel, Rolling | Held]):
             names, units = ("load", "drawbar", "torque", "sinkage"), ("N/m", "N/m", "N", "m")
             loads = zip(names, found.means, found.noise, units, strict=True)
             lines = [f"{name} {mean:.4g} ± {noise:.2g} {unit}" for name, mean, noise, unit in loads]
+            lines.append(f"behind, the sand leaves the rim {1e3 * found.rear:.1f} mm below the level surface")
             return [*lines, f"over that time it sinks by {1e3 * found.sinking:.1f} mm"] if study.sinks else lines
         scaled = found.speed / _unit_speed(study)
         return [
