@@ -11,7 +11,7 @@ Array = NDArray[np.float64]
 
 BINS = 120
 """Parts of the rim, by their angle at the axle."""
-VANISHED = 0.05
+VANISHED = 0.01
 """Pressure over its largest that counts as vanished [-]."""
 
 
