@@ -28,6 +28,8 @@ SLIPS: Final = (-0.2, 0.0, 0.1, 0.2, 0.3, 0.4, 0.6, 0.8)
 """Slips of the shipped wheels [-]."""
 SINKAGE: Final = 0.03
 """Sinkage at which the slip is varied [m]."""
+HELD_SLIP: Final = 0.3
+"""Slip at which cells and places on the grid are varied [-]."""
 LOADED_SLIPS: Final = (0.0, 0.1, 0.2, 0.3, 0.4, 0.6)
 """Slips of the shipped wheels that sink under their load [-]."""
 LOAD: Final = HeldWheel.mass_z * HeldWheel.gravity / HeldWheel.breadth
@@ -59,6 +61,7 @@ def _read(results: Results) -> list[dict[str, float]]:
     return [
         {n: one["heldwheel"][n] for n in kept}
         | {"mu_2": one["heldwheel"].get("mu_2") or one["heldwheel"]["mu_int"]}
+        | {"duration": one["heldwheel"]["duration"] or 0.0}
         | {n: one[n] for n in names}
         for one in results
     ]
@@ -165,10 +168,11 @@ def _rear_rows(measured: Measured) -> list[Row]:
 def _cell_rows(table: list[dict[str, float]]) -> list[Row]:
     """The rows of each run against that of the next larger cells, or of the same half a cell aside."""
     rows = []
-    for grousers, mu, mu_2 in sorted({(one["grousers"], one["mu_int"], one["mu_2"]) for one in table}):
-        wanted = (grousers, mu, mu_2, 0.3)
-        own = [o for o in table if (o["grousers"], o["mu_int"], o["mu_2"], o["prescribed_slip"]) == wanted]
-        sand = f"μ_int {mu:g}" if mu_2 == mu else f"μ(I) from {mu:g} to {mu_2:g}"
+    names = ("grousers", "mu_int", "mu_2", "duration")
+    for kind in sorted({tuple(one[name] for name in names) for one in table}):
+        own = [o for o in table if tuple(o[name] for name in names) == kind and o["prescribed_slip"] == HELD_SLIP]
+        grousers, mu, mu_2, duration = kind
+        sand = (f"μ_int {mu:g}" if mu_2 == mu else f"μ(I) from {mu:g} to {mu_2:g}") + (", longer" if duration else "")
         for before, after, how in _pairs(own):
             what = f"continuum, {'wheel' if grousers else 'disc'}, {sand}, {how}"
             for said, got, expected, unit, size in _compared(after, before):

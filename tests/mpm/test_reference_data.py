@@ -117,10 +117,10 @@ def test_the_limit_is_below_table_c1(mu, share):
     assert alpha / (ALPHA_Z * TABLE_C1[mu]) == pytest.approx(share, abs=0.002)
 
 
-def held(grousers, mu, dx, shift=0.0, mu_2=None):
+def held(grousers, mu, dx, shift=0.0, mu_2=None, duration=None):
     """Load [N/m] and torque [N] of a shipped wheel at slip 0.3."""
     wanted = {"grousers": grousers, "mu_int": mu, "dx": pytest.approx(dx), "shift": shift, "prescribed_slip": 0.3}
-    wanted["mu_2"] = mu_2
+    wanted |= {"mu_2": mu_2, "duration": duration}
     own = [f["heldwheel"] | f for f in results(DATA / "held")]
     own = [one for one in own if all(one.get(name) == value for name, value in wanted.items())]
     assert len(own) == 1
@@ -132,6 +132,14 @@ def test_a_wheel_in_weak_sand_has_converged():
     expected = pytest.approx(held(20, 0.4, 0.002), rel=0.05)
     assert held(20, 0.4, 0.004 / 3.0) == expected
     assert held(20, 0.4, 0.002, shift=0.5) == expected
+
+
+@pytest.mark.parametrize(("grousers", "mu", "mu_2"), [(0, 0.4, 0.66), (20, 0.56, 0.82)])
+def test_where_friction_grows_with_the_rate_wheels_have_converged(grousers, mu, mu_2):
+    """With mu(I), load and torque: at most 5 % from cells of 2 to 1.33 mm, and from half a cell aside."""
+    expected = pytest.approx(held(grousers, mu, 0.002, mu_2=mu_2), rel=0.05)
+    assert held(grousers, mu, 0.004 / 3.0, mu_2=mu_2) == expected
+    assert held(grousers, mu, 0.002, shift=0.5, mu_2=mu_2) == expected
 
 
 @pytest.mark.parametrize(("mu", "least"), [(0.4, 0.85), (0.56, 0.7)])
