@@ -142,6 +142,13 @@ def test_where_friction_grows_with_the_rate_wheels_have_converged(grousers, mu, 
     assert held(grousers, mu, 0.002, shift=0.5, mu_2=mu_2) == expected
 
 
+def test_a_disc_on_poppy_seeds_has_converged_in_long_means():
+    """With mu(I) from 0.56: at most 5 % from cells of 2 to 1.33 mm over twice the way, and from half a cell aside."""
+    long = {"mu_2": 0.82, "duration": 1.44}
+    assert held(0, 0.56, 0.004 / 3.0, **long) == pytest.approx(held(0, 0.56, 0.002, **long), rel=0.05)
+    assert held(0, 0.56, 0.002, shift=0.5, mu_2=0.82) == pytest.approx(held(0, 0.56, 0.002, mu_2=0.82), rel=0.05)
+
+
 @pytest.mark.parametrize(("mu", "least"), [(0.4, 0.85), (0.56, 0.7)])
 def test_a_disc_bears_less_the_finer_its_cells(mu, least):
     """Without dilatancy there is no exact limit load: finer cells go from the upper limit towards the lower.
