@@ -13,6 +13,7 @@ from typing import Any, Final
 
 import numpy as np
 from rftsim_models.wheels import GROUSER_WHEEL
+from rftsim_mpm.campaign import DATA, results
 from rftsim_mpm.testbed import HeldWheel
 
 from rftsim.law.rigid import surface_force
@@ -34,10 +35,12 @@ LOADED_SLIPS: Final = (0.0, 0.1, 0.2, 0.3, 0.4, 0.6)
 """Slips of the shipped wheels that sink under their load [-]."""
 LOAD: Final = HeldWheel.mass_z * HeldWheel.gravity / HeldWheel.breadth
 """That load, per metre of breadth [N/m]."""
-RATE: Final = math.pi
-"""Angular velocity of the wheels, 30 turns a minute [rad/s]."""
-NOTE: Final = "no exact limit load without dilatancy, and means wander"
-"""What is said of the continuum where it has not converged."""
+RPM: Final = math.pi / 30.0
+"""One turn a minute [rad/s]."""
+RATE: Final = HeldWheel.rpm * RPM
+"""Angular velocity of the wheels [rad/s]."""
+NOTES: Final = ("no exact limit load without dilatancy, and means wander", "coarse cells, or means that wander")
+"""What is said of the continuum where it has not converged, without and with friction that grows with the rate."""
 PHASES: Final = 8
 """Phases of the wheel, within the angle between grousers, that the laws are averaged over."""
 FORCES: Final = ("load_N_m", "drawbar_N_m", "torque_N")
@@ -52,7 +55,33 @@ def jobs(request: Request) -> dict[str, Callable[[], Any]]:
     """The job that reads what is shipped, and one for each law and slip."""
     laws = {f"{law}/{slip:g}": functools.partial(_law, law, slip, SINKAGE) for law in LAWS for slip in SLIPS}
     under = {f"loaded {law}/{slip:g}": functools.partial(_at_load, law, slip) for law in LAWS for slip in LOADED_SLIPS}
-    return shipped("held", _read) | shipped("loaded", _read_loaded) | laws | under
+    behind = {
+        _dropped(one, drop): functools.partial(_at_load, LAWS[-1], one["prescribed_slip"], one["rpm"] * RPM, drop)
+        for one in _rears()
+        for drop in _drops(one)
+    }
+    return shipped("held", _read) | shipped("loaded", _read_loaded) | laws | under | behind
+
+
+def _rears() -> list[dict[str, float]]:
+    """The shipped wheels under their load that say where the sand leaves their rim, over the rate."""
+    folder = DATA / "loaded"
+    found = _read_loaded(results(folder)) if folder.exists() else []
+    return sorted((one for one in found if one["mu_2"] == POPPY.mu_int and not math.isnan(one["rear_m"])), key=_rate)
+
+
+def _rate(one: dict[str, float]) -> float:
+    return one["rpm"]
+
+
+def _drops(one: dict[str, float]) -> tuple[float, float]:
+    """The drop of the surface behind by [Agarwal] section 4.6.2, and as a shipped wheel has it [m]."""
+    return GROUSER_WHEEL.outer_radius**2 * (one["rpm"] * RPM) ** 2 / POPPY.g, one["rear_m"]
+
+
+def _dropped(one: dict[str, float], drop: float) -> str:
+    """The name of the job of the dynamic law at a wheel's rate, with a drop behind it."""
+    return f"behind {one['rpm']:g}/{drop:.5f}"
 
 
 def _read(results: Results) -> list[dict[str, float]]:
@@ -71,6 +100,7 @@ def _read_loaded(results: Results) -> list[dict[str, float]]:
     names = ("sinkage_m", "drawbar_N_m", "torque_N", "sinking_m")
     return [
         {n: one["heldwheel"][n] for n in ("prescribed_slip", "dx", "rpm")}
+        | {"mu_2": one["heldwheel"].get("mu_2") or one["heldwheel"]["mu_int"]}
         | {n: one[n] for n in names}
         | {"rear_m": one.get("rear_m", math.nan)}
         for one in sorted(results, key=lambda one: (-one["heldwheel"]["dx"], one["heldwheel"]["prescribed_slip"]))
@@ -82,18 +112,22 @@ def _at_one_rate(measured: Measured) -> list[dict[str, float]]:
     return [one for one in outcome(measured, "loaded") or [] if one["rpm"] == HeldWheel.rpm]
 
 
-def _at_load(law: str, slip: float) -> dict[str, float]:
+def _at_load(law: str, slip: float, rate: float = RATE, drop: float | None = None) -> dict[str, float]:
     """The sinkage at which a law bears the wheel's load at a slip, and the forces there."""
     low, high = 0.0, GROUSER_WHEEL.outer_radius
     for _ in range(20):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if _law(law, slip, middle)["load_N_m"] < LOAD else (low, middle)
-    return {"sinkage_m": high, **_law(law, slip, high)}
+        low, high = (middle, high) if _law(law, slip, middle, rate, drop)["load_N_m"] < LOAD else (low, middle)
+    return {"sinkage_m": high, **_law(law, slip, high, rate, drop)}
 
 
-def _law(law: str, slip: float, sinkage: float) -> dict[str, float]:
-    """The forces that a law gives on the wheel at a slip and a sinkage, a third of its grousers' height felt."""
+def _law(law: str, slip: float, sinkage: float, rate: float = RATE, drop: float | None = None) -> dict[str, float]:
+    """The forces that a law gives on the wheel at a slip and a sinkage, a third of its grousers' height felt.
+
+    A drop behind the wheel [m] that is not the law's own is that of another gravity, on which nothing else hangs.
+    """
     own = GROUSER_WHEEL
+    sand = POPPY if drop is None else dataclasses.replace(POPPY, g=(own.outer_radius * rate) ** 2 / drop)
     wheel = Grousers(own.radius, own.outer_radius, own.width, own.lugs, own.lug_width)
     surface = wheel.with_height(own.felt_height).surface
     surface = dataclasses.replace(surface, wheel=Wheel((0, 1, 0), (0, 0, 0), own.outer_radius))
@@ -101,9 +135,9 @@ def _law(law: str, slip: float, sinkage: float) -> dict[str, float]:
     for phase in wheel.pitch * np.arange(PHASES) / PHASES:
         c, s = math.cos(phase), math.sin(phase)
         found = surface_force(
-            surface, POPPY, law, position=(0.0, 0.0, own.outer_radius - sinkage),
+            surface, sand, law, position=(0.0, 0.0, own.outer_radius - sinkage),
             rotation=[[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]],
-            velocity=((1.0 - slip) * RATE * own.outer_radius, 0.0, 0.0), angular_velocity=(0.0, RATE, 0.0),
+            velocity=((1.0 - slip) * rate * own.outer_radius, 0.0, 0.0), angular_velocity=(0.0, rate, 0.0),
         )  # fmt: skip
         total += [found.force[2], found.force[0], -found.moment[1]]
     return dict(zip(FORCES, (total / PHASES / own.width).tolist(), strict=True))
@@ -137,14 +171,17 @@ def _law_rows(measured: Measured, table: list[dict[str, float]]) -> list[Row]:
 def _loaded_rows(measured: Measured) -> list[Row]:
     """The rows of the dynamic law over the slip at a load, to be read, and of the continuum's finer cells."""
     table = _at_one_rate(measured)
-    coarse = {one["prescribed_slip"]: one for one in table if one["dx"] == CELL}
+    coarse = {(one["prescribed_slip"], one["mu_2"]): one for one in table if one["dx"] == CELL}
     rows = []
     for one in table:
-        slip = one["prescribed_slip"]
-        if one["dx"] == CELL:
-            what, found, expected, source = LAWS[-1], measured[f"loaded {LAWS[-1]}/{slip:g}"], one, "our continuum"
+        slip, sand = one["prescribed_slip"], "" if one["mu_2"] == POPPY.mu_int else f", μ(I) to {one['mu_2']:g}"
+        if one["dx"] != CELL:
+            what = f"continuum{sand}, {1e3 * one['dx']:g} mm"
+            found, expected, source = one, coarse[slip, one["mu_2"]], "itself at 4 mm"
+        elif sand:
+            continue
         else:
-            what, found, expected, source = f"continuum, {1e3 * one['dx']:g} mm", one, coarse[slip], "itself at 4 mm"
+            what, found, expected, source = LAWS[-1], measured[f"loaded {LAWS[-1]}/{slip:g}"], one, "our continuum"
         note = f"sinkage changes by {1e3 * one['sinking_m']:+.1f} mm meanwhile"
         for name, unit, factor in (("sinkage_m", "mm", 1e3), ("drawbar_N_m", "N/m", 1.0), ("torque_N", "N", 1.0)):
             said = f"{what}, under its load, slip {slip:g}: {name.partition('_')[0]}"
@@ -153,15 +190,15 @@ def _loaded_rows(measured: Measured) -> list[Row]:
 
 
 def _rear_rows(measured: Measured) -> list[Row]:
-    """The rows of where the sand leaves the rim behind, over the rate: delta h of [Agarwal] section 4.6.2."""
-    table = [one for one in outcome(measured, "loaded") or [] if not math.isnan(one["rear_m"])]
-    rows = []
-    for one in sorted(table, key=lambda one: one["rpm"]):
-        omega = one["rpm"] * 2.0 * math.pi / 60.0
-        drop = 1e3 * min(GROUSER_WHEEL.outer_radius**2 * omega**2 / POPPY.g, one["sinkage_m"])
-        said = f"drop behind, {one['rpm']:g} RPM, slip {one['prescribed_slip']:g}: at most the sinkage"
-        note = f"sinkage of the continuum's {1e3 * one['sinkage_m']:.1f} mm"
-        rows.append(Row(said, drop, "our continuum", "mm", expected=1e3 * one["rear_m"], note=note))
+    """The rows of where the sand leaves the rim behind, over the rate, and of the dynamic law with either drop."""
+    rows, law = [], LAWS[-1]
+    for one in _rears():
+        own, read = _drops(one)
+        what, note = f"{law}, {one['rpm']:g} RPM", f"sinkage of the continuum's {1e3 * one['sinkage_m']:.1f} mm"
+        rows.append(Row(f"{what}: drop δh", 1e3 * own, "our continuum", "mm", expected=1e3 * read, note=note))
+        for drop, whose in ((own, "its own δh"), (read, "the continuum's δh")):
+            got, expected = measured[_dropped(one, drop)]["drawbar_N_m"], one["drawbar_N_m"]
+            rows.append(Row(f"{what}, {whose}: drawbar", got, "our continuum", "N/m", expected=expected))
     return rows
 
 
@@ -177,7 +214,7 @@ def _cell_rows(table: list[dict[str, float]]) -> list[Row]:
             what = f"continuum, {'wheel' if grousers else 'disc'}, {sand}, {how}"
             for said, got, expected, unit, size in _compared(after, before):
                 within = CONVERGED * size
-                note = NOTE if mu_2 == mu and abs(got - expected) > within else ""
+                note = NOTES[mu_2 != mu] if abs(got - expected) > within else ""
                 rows.append(near(f"{what}: {said}", got, expected, within, "itself before", unit=unit, note=note))
     return rows
 
@@ -231,7 +268,7 @@ def _draw_held(measured: Measured, axes: Any) -> None:
 
 
 def _draw_loaded(measured: Measured, axes: Any) -> None:
-    table = _at_one_rate(measured)
+    table = [one for one in _at_one_rate(measured) if one["mu_2"] == POPPY.mu_int]
     names = {"sinkage_m": "sinkage [m]", "drawbar_N_m": "drawbar [N/m]", "torque_N": "torque [N]"}
     for axis, (name, said) in zip(axes, names.items(), strict=True):
         for dx, mark in zip(sorted({one["dx"] for one in table}, reverse=True), ("ko", "C3v"), strict=False):
