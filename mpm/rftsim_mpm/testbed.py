@@ -71,6 +71,8 @@ class HeldWheel(Wheel):
             raise MpmError(f"dim must be 2 or 3, not {self.dim}")
         if not self.held and self.dim == 3:
             raise MpmError("a free wheel is computed in the plane: prescribe its slip in space")
+        if not self.held and self.mu_2 is not None:
+            raise MpmError("a free wheel is computed without mu_2: prescribe its slip")
         if not self.held:
             return
         slip = float(self.prescribed_slip or 0.0)

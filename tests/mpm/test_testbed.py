@@ -83,6 +83,7 @@ def test_a_wheel_in_space_feels_the_same_the_other_way():
     [({"prescribed_slip": None}, "prescribed_slip is missing"), ({"shift": 0.3}, "shift"),
      ({"prescribed_slip": 1.5}, "slip"),
      ({"prescribed_sinkage": 0.06}, "sinkage"), ({"grousers": 1}, "grousers"), ({"calm": -1.0}, "calm"),
+     ({"mu_2": 0.7, "prescribed_slip": None, "prescribed_sinkage": None}, "without mu_2"),
      ({"dim": 4}, "dim"), ({"dim": 3, "prescribed_slip": None, "prescribed_sinkage": None}, "a free wheel")],
 )  # fmt: skip
 def test_wheels_that_cannot_be_held(bad, said):
