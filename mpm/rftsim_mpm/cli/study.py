@@ -6,7 +6,7 @@ import dataclasses
 import importlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any, ClassVar, Generic, TypeVar
+from typing import Annotated, Any, ClassVar, Generic, TypeVar
 
 import tyro
 from rich.console import Console
@@ -99,7 +99,7 @@ class StudyCommand(abc.ABC, Generic[Study, Found]):
     title: ClassVar[str]
     """Title of the bar that shows how far the study is."""
     study: tyro.conf.OmitArgPrefixes[Study]
-    out: tyro.conf.OmitArgPrefixes[Outputs]
+    out: Annotated[tyro.conf.OmitArgPrefixes[Outputs], tyro.conf.arg(help="")]
 
     def __call__(self) -> None:
         """Run the study, print what it found and draw it."""
