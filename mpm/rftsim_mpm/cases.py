@@ -167,8 +167,7 @@ def plates(study: Plates, watch: Watch | None = None) -> PlatesForces:
     curves, pairs = [], []
     for i, length in enumerate(study.lengths):
         track = _push(study, [0.0], length, part(watch, i, count))
-        start = math.ceil(study.bed[1] / study.dx) * study.dx + 2.0 * study.dx
-        curves.append((start - track.position[:, 0, 1], track.force[:, 0, 1]))
+        curves.append((_first_height(study) - track.position[:, 0, 1], track.force[:, 0, 1]))
     for i, gap in enumerate(study.gaps):
         offset = 0.5 * (1.0 + gap) * study.pair
         track = _push(study, [-offset, offset], study.pair, part(watch, len(study.lengths) + i, count))
@@ -181,13 +180,18 @@ def plates(study: Plates, watch: Watch | None = None) -> PlatesForces:
     return PlatesForces(curves, peak, deep, slopes[0], slopes[1], np.array(pairs), track.frames[-1])
 
 
+def _first_height(study: Plates) -> float:
+    """Height of the middle of plates that stand on the sand [m]."""
+    return _whole_cells(study.bed, study.dx)[1] + 2.0 * study.dx
+
+
 def _push(study: Plates, offsets: list[float], length: float, watch: Watch | None) -> Track:
     """Push plates of a length down side by side, their middles at offsets from the bed's [m]."""
     young = stiffness(study.rho, GRAVITY, study.depth, study.mu_int, 0.01)
     material = Material.of_density(study.mu_int, study.rho, young)
     size = _whole_cells(study.bed, study.dx)
     shape, down = box(length, 4.0 * study.dx), np.array([0.0, -study.speed])
-    places = [np.array([0.5 * size[0] + o, size[1] + 2.0 * study.dx]) for o in offsets]
+    places = [np.array([0.5 * size[0] + o, _first_height(study)]) for o in offsets]
     steer = speeding_up(down, study.run_up)
     bodies = [Body(shape, place, np.zeros(2), study.mu_surf, steer=steer) for place in places]
     sim = _sim(material, size, study.dx, size[1] + study.depth + 8.0 * study.dx, bodies, absorb=study.absorb)

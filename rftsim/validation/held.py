@@ -8,6 +8,7 @@ import dataclasses
 import functools
 import itertools
 import math
+import operator
 from collections.abc import Callable, Iterator
 from typing import Any, Final
 
@@ -57,29 +58,24 @@ def jobs(request: Request) -> dict[str, Callable[[], Any]]:
     under = {f"loaded {law}/{slip:g}": functools.partial(_at_load, law, slip) for law in LAWS for slip in LOADED_SLIPS}
     behind = {
         _dropped(one, drop): functools.partial(_at_load, LAWS[-1], one["prescribed_slip"], one["rpm"] * RPM, drop)
-        for one in _rears()
+        for one in _rears(_read_loaded(results(DATA / "loaded")) if (DATA / "loaded").exists() else [])
         for drop in _drops(one)
     }
     return shipped("held", _read) | shipped("loaded", _read_loaded) | laws | under | behind
 
 
-def _rears() -> list[dict[str, float]]:
-    """The shipped wheels under their load that say where the sand leaves their rim, over the rate."""
-    folder = DATA / "loaded"
-    found = _read_loaded(results(folder)) if folder.exists() else []
-    return sorted((one for one in found if one["mu_2"] == POPPY.mu_int and not math.isnan(one["rear_m"])), key=_rate)
+def _rears(table: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The wheels under their load that say where the sand leaves their rim, over the rate."""
+    said = [one for one in table if one["rear_m"] is not None and one["mu_2"] == POPPY.mu_int]
+    return sorted(said, key=operator.itemgetter("rpm"))
 
 
-def _rate(one: dict[str, float]) -> float:
-    return one["rpm"]
-
-
-def _drops(one: dict[str, float]) -> tuple[float, float]:
+def _drops(one: dict[str, Any]) -> tuple[float, float]:
     """The drop of the surface behind by [Agarwal] section 4.6.2, and as a shipped wheel has it [m]."""
     return GROUSER_WHEEL.outer_radius**2 * (one["rpm"] * RPM) ** 2 / POPPY.g, one["rear_m"]
 
 
-def _dropped(one: dict[str, float], drop: float) -> str:
+def _dropped(one: dict[str, Any], drop: float) -> str:
     """The name of the job of the dynamic law at a wheel's rate, with a drop behind it."""
     return f"behind {one['rpm']:g}/{drop:.5f}"
 
@@ -89,20 +85,23 @@ def _read(results: Results) -> list[dict[str, float]]:
     names = (*FORCES, *(f"{name}_noise" for name in FORCES))
     return [
         {n: one["heldwheel"][n] for n in kept}
-        | {"mu_2": one["heldwheel"].get("mu_2") or one["heldwheel"]["mu_int"]}
-        | {"duration": one["heldwheel"]["duration"] or 0.0}
+        | {"mu_2": _fastest(one), "duration": one["heldwheel"]["duration"] or 0.0}
         | {n: one[n] for n in names}
         for one in results
     ]
 
 
-def _read_loaded(results: Results) -> list[dict[str, float]]:
+def _fastest(one: dict[str, Any]) -> float:
+    """Friction of a wheel's sand in its fastest flow: that at rest where it knows no rate [-]."""
+    return float(one["heldwheel"].get("mu_2") or one["heldwheel"]["mu_int"])
+
+
+def _read_loaded(results: Results) -> list[dict[str, Any]]:
     names = ("sinkage_m", "drawbar_N_m", "torque_N", "sinking_m")
     return [
         {n: one["heldwheel"][n] for n in ("prescribed_slip", "dx", "rpm")}
-        | {"mu_2": one["heldwheel"].get("mu_2") or one["heldwheel"]["mu_int"]}
+        | {"mu_2": _fastest(one), "rear_m": one.get("rear_m")}
         | {n: one[n] for n in names}
-        | {"rear_m": one.get("rear_m", math.nan)}
         for one in sorted(results, key=lambda one: (-one["heldwheel"]["dx"], one["heldwheel"]["prescribed_slip"]))
     ]
 
@@ -192,7 +191,7 @@ def _loaded_rows(measured: Measured) -> list[Row]:
 def _rear_rows(measured: Measured) -> list[Row]:
     """The rows of where the sand leaves the rim behind, over the rate, and of the dynamic law with either drop."""
     rows, law = [], LAWS[-1]
-    for one in _rears():
+    for one in _rears(outcome(measured, "loaded") or []):
         own, read = _drops(one)
         what, note = f"{law}, {one['rpm']:g} RPM", f"sinkage of the continuum's {1e3 * one['sinkage_m']:.1f} mm"
         rows.append(Row(f"{what}: drop δh", 1e3 * own, "our continuum", "mm", expected=1e3 * read, note=note))
