@@ -192,8 +192,8 @@ def test_the_same_facets_every_time(searches):
     np.testing.assert_array_equal(pair[0].triangles, pair[1].triangles)
 
 
-def test_a_robot_is_reduced_in_seconds(searches):
-    """Unitree Go1, on one processor; and at once where it is known."""
+def test_a_robot_is_reduced_within_a_few_loads(searches):
+    """Unitree Go1, searched in the time of at most ten loads, and at once where it is known."""
     path = ROBOTS / "unitree_go1" / "go1.xml"
     if not path.is_file():
         pytest.skip(f"no {path}")
@@ -205,7 +205,7 @@ def test_a_robot_is_reduced_in_seconds(searches):
         times.append(time.process_time() - start)
     plain, first, again = times
     print(f"{len(searches)} searches; {plain:.2f} s without reduction, {first:.2f} s with it, {again:.2f} s once known")
-    assert first - plain < 5.0
+    assert first - plain < 10.0 * again
     assert again - plain < 0.2 * (first - plain)
 
 
