@@ -14,9 +14,10 @@ from rftsim.engine.layout import CONSTANTS
 from rftsim.engine.refusals import WHY
 from rftsim.law import exports
 from rftsim.law.body import bed_of, header_at
+from rftsim.machine import lanes
 from rftsim.machine.compiling import inline
 from rftsim.machine.memory import doubles, int32s, pointer, release, stack_doubles, take
-from rftsim.solver import equation, linear_algebra, sparse, state, time_step
+from rftsim.solver import equation, linear_algebra, matrices, sparse, state, time_step
 from rftsim.solver.equation import TABLE, WORK
 from rftsim.solver.motion import size_of
 from rftsim.solver.sinking import is_near
@@ -112,7 +113,7 @@ def _fill_bodies(model, m, t, address, old, i, island, p):
             path[at] = place[dof]
             bodies.motion_by(t, body, dof, equation.motion(p, b, at))
             dof = t.dof_parent[dof]
-        if n > 1:
+        if n > 1 and not matrices.is_small(p):
             sparse.join(p, path[n - 1], path, n - 1)
         linear_algebra.copy(t.xmat[9 * body : 9 * body + 9], r)
         bodies.twist(t, body, v, w)
@@ -130,11 +131,25 @@ def _fill_bodies(model, m, t, address, old, i, island, p):
 def _couple(number, start, column, i, island, p):
     """Couple what a matrix of MuJoCo's couples below its diagonal: so many columns of each row, from a start."""
     place, dofs, first = islands.place_of(i), islands.dofs(i), islands.dof_start(i)[island]
-    for k in range(equation.head(p).ndof):
+    for k in range(islands.dof_count(i)[island]):
         dof, known = dofs[first + k], np.int64(0)
         for entry in range(start[dof], start[dof] + number[dof]):
             if column[entry] < dof:
                 known = sparse.couple_on(p, k, place[column[entry]], known)
+
+
+@inline
+def _fill_pattern(model, m, i, island, p):
+    """Couple what MuJoCo's own matrices couple, and what elimination then fills in; rows and bodies did theirs."""
+    nv = islands.head(i).nv
+    number, start = int32s(pointer(m + model.M_rownnz), nv), int32s(pointer(m + model.M_rowadr), nv)
+    total = start[nv - 1] + number[nv - 1]
+    _couple(number, start, int32s(pointer(m + model.M_colind), total), i, island, p)
+    if int32s(m + model.opt_integrator, 1)[0] != _EULER:
+        number, start = int32s(pointer(m + model.D_rownnz), nv), int32s(pointer(m + model.D_rowadr), nv)
+        total = start[nv - 1] + number[nv - 1]
+        _couple(number, start, int32s(pointer(m + model.D_colind), total), i, island, p)
+    sparse.close(p)
 
 
 @inline
@@ -145,12 +160,14 @@ def _fill_mass(model, data, m, d, i, island, p):
     total = start[nv - 1] + number[nv - 1]
     column, value = int32s(pointer(m + model.M_colind), total), doubles(pointer(d + data.M), total)
     out = equation.plain_mass(p)
-    sparse.clear(p, out)
-    for k in range(out.shape[0]):
+    matrices.clear(p, out)
+    for k in range(islands.dof_count(i)[island]):
         dof = dofs[first + k]
         for entry in range(start[dof], start[dof] + number[dof]):
             other = place[column[entry]]
             out[k, other] = out[other, k] = value[entry]
+    for k in range(islands.dof_count(i)[island], out.shape[0]):
+        out[k, k] = 1.0
 
 
 @inline
@@ -158,19 +175,19 @@ def _fill_drag(model, data, m, d, i, island, p):
     """Fill the drag that the integrator takes implicitly, over the time step, and whether there is any."""
     nv, place, dofs, first = islands.head(i).nv, islands.place_of(i), islands.dofs(i), islands.dof_start(i)[island]
     out, numbers, integrator = equation.drag(p), equation.numbers(p), int32s(m + model.opt_integrator, 1)[0]
-    sparse.clear(p, out)
+    matrices.clear(p, out)
     numbers.dragged = 0.0
     if integrator == _EULER:
         if int32s(m + model.opt_disableflags, 1)[0] & _UNDAMPED == 0:
             damping = doubles(pointer(m + model.dof_damping), nv)
-            for k in range(out.shape[0]):
+            for k in range(islands.dof_count(i)[island]):
                 out[k, k] = damping[dofs[first + k]]
                 numbers.dragged = 1.0 if out[k, k] != 0.0 else numbers.dragged
         return
     number, start = int32s(pointer(m + model.D_rownnz), nv), int32s(pointer(m + model.D_rowadr), nv)
     total = start[nv - 1] + number[nv - 1]
     column, value = int32s(pointer(m + model.D_colind), total), doubles(pointer(d + data.qDeriv), total)
-    for k in range(out.shape[0]):
+    for k in range(islands.dof_count(i)[island]):
         dof = dofs[first + k]
         for entry in range(start[dof], start[dof] + number[dof]):
             j = column[entry]
@@ -187,23 +204,21 @@ def _fill_dofs(model, data, m, d, old, i, island, p):
     nv, dofs, first = islands.head(i).nv, islands.dofs(i), islands.dof_start(i)[island]
     velocity, lacking = doubles(pointer(d + data.qvel), nv), state.lacking(old, nv)
     light, smooth = doubles(pointer(m + model.dof_invweight0), nv), islands.smooth_force(i)
-    for k in range(equation.head(p).ndof):
+    count = islands.dof_count(i)[island]
+    for k in range(count):
         dof = dofs[first + k]
         equation.velocity(p)[k], equation.lacking(p)[k] = velocity[dof], lacking[dof]
         equation.lightness(p)[k], equation.smooth_force(p)[k] = light[dof], smooth[dof]
-    number, start = int32s(pointer(m + model.M_rownnz), nv), int32s(pointer(m + model.M_rowadr), nv)
-    total = start[nv - 1] + number[nv - 1]
-    _couple(number, start, int32s(pointer(m + model.M_colind), total), i, island, p)
-    if int32s(m + model.opt_integrator, 1)[0] != _EULER:
-        number, start = int32s(pointer(m + model.D_rownnz), nv), int32s(pointer(m + model.D_rowadr), nv)
-        total = start[nv - 1] + number[nv - 1]
-        _couple(number, start, int32s(pointer(m + model.D_colind), total), i, island, p)
-    sparse.close(p)
+    for k in range(count, equation.head(p).ndof):
+        equation.velocity(p)[k] = equation.lacking(p)[k] = equation.smooth_force(p)[k] = 0.0
+        equation.lightness(p)[k] = 1.0
+    if not matrices.is_small(p):
+        _fill_pattern(model, m, i, island, p)
     _fill_mass(model, data, m, d, i, island, p)
     _fill_drag(model, data, m, d, i, island, p)
     if equation.head(p).nrow > 0 and equation.numbers(p).dragged > 0.0:
-        sparse.copy(p, equation.plain_mass(p), equation.plain_factors(p))
-        sparse.factor(p, equation.plain_factors(p))
+        matrices.copy(p, equation.plain_mass(p), equation.plain_factors(p))
+        matrices.factor(p, equation.plain_factors(p))
 
 
 @inline
@@ -211,7 +226,7 @@ def _hand_over(model, data, m, d, address, new, i, island, p):
     """Add an island's force to MuJoCo's passive ones, and keep what must last."""
     nv, dofs, first = islands.head(i).nv, islands.dofs(i), islands.dof_start(i)[island]
     force, lacking, after = doubles(pointer(d + data.qfrc_passive), nv), state.lacking(new, nv), state.after(new, nv)
-    for k in range(equation.head(p).ndof):
+    for k in range(islands.dof_count(i)[island]):
         dof = dofs[first + k]
         force[dof] += equation.out(p)[k]
         lacking[dof], after[dof] = equation.lacking(p)[k], equation.after(p)[k]
@@ -231,7 +246,7 @@ def _solve(model, data, contact, m, d, t, address, sand, old, new, i, island):
     p, work = stack_doubles(TABLE), doubles(stack_doubles(_WORK), _WORK)
     linear_algebra.clear(work)
     counts = islands.body_count(i)[island], islands.dof_count(i)[island], islands.row_count(i)[island]
-    memory = take(equation.lay_out(p, counts[0], counts[1], counts[2]))
+    memory = take(equation.lay_out(p, counts[0], lanes.padded(counts[1]), counts[2]))
     if memory == 0:
         return False
     equation.place(p, memory)
@@ -241,7 +256,7 @@ def _solve(model, data, contact, m, d, t, address, sand, old, new, i, island):
     numbers.tolerance, numbers.iterations = bed.tolerance, bed.iterations
     numbers.drift = numbers.parts = 0.0
     numbers.timestep, numbers.started = doubles(m + model.opt_timestep, 1)[0], state.started(old)[0]
-    for k in range(counts[1]):
+    for k in range(lanes.padded(counts[1])):
         equation.coupled_length(p)[k] = 0
     _fill_bodies(model, m, t, address, old, i, island, p)
     constraints.fill_rows(model, data, contact, m, d, i, island, p)

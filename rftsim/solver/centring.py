@@ -4,7 +4,7 @@ from typing import Final
 
 from rftsim.machine.compiling import exact
 from rftsim.machine.memory import doubles, stack_doubles
-from rftsim.solver import equation, linear_algebra, linearised, sparse
+from rftsim.solver import equation, linear_algebra, linearised, matrices
 from rftsim.solver.equation import POINT
 from rftsim.solver.motion import add_wrench, differentiate, evaluate, felt_twist, generalised, speed_of, twist_of
 
@@ -123,9 +123,9 @@ def _evaluate(p):
 def _correct(p):
     """Add the effect of the mean velocity to `end`, unless it is larger than half of the step's change of velocity."""
     mean, changed, impulse = equation.mean(p), equation.filtered(p), equation.difference(p)
-    sparse.multiply(p, equation.mass(p), mean, impulse)
+    matrices.multiply(p, equation.mass(p), mean, impulse)
     largest = 0.25 * linear_algebra.dot(mean, impulse)
-    sparse.multiply(p, equation.mass(p), changed, impulse)
+    matrices.multiply(p, equation.mass(p), changed, impulse)
     if linear_algebra.dot(changed, impulse) <= largest:  # else the derivative is not to be trusted
         end = equation.end(p)
         for k in range(end.size):
@@ -137,5 +137,5 @@ def _filter(p, impulse, out):
     """Fill out with A^-1 M A^-1 impulse, A the matrix that the linearised equation left factored."""
     between = equation.solved(p)
     linearised.substitute(p, impulse, equation.seen(p), out)
-    sparse.multiply(p, equation.mass(p), out, between)
+    matrices.multiply(p, equation.mass(p), out, between)
     linearised.substitute(p, between, equation.seen(p), out)

@@ -10,7 +10,7 @@ import numpy as np
 
 from rftsim.law.stress import TINY
 from rftsim.machine.compiling import exact
-from rftsim.solver import equation, sparse
+from rftsim.solver import equation, matrices
 from rftsim.solver.equation import KIND
 
 FREE: Final = 0
@@ -34,8 +34,8 @@ def _seen(p, change):
     if equation.numbers(p).dragged == 0.0:
         return change
     h, dragged, seen = equation.numbers(p).h, equation.slowed(p), equation.seen(p)
-    sparse.multiply(p, equation.drag(p), change, dragged)
-    sparse.substitute(p, equation.plain_factors(p), dragged, seen)
+    matrices.multiply(p, equation.drag(p), change, dragged)
+    matrices.substitute(p, equation.plain_factors(p), dragged, seen)
     for k in range(seen.size):
         seen[k] = change[k] + h * seen[k]
     return seen

@@ -18,7 +18,8 @@ from rftsim.machine.table import Table
 from rftsim.solver.state import KEPT_NUMBERS, kept_at
 
 TABLE_HEAD: Final = np.dtype([(name, "i8") for name in ("nbody", "ndof", "nrow", "sand", "work")])
-"""The head of a table: the counts; then addresses, of the packed sand, and of the counters of WORK."""
+"""The head of a table: the counts, of which that of degrees of freedom is a multiple of LANES, see `lanes`, and those
+at its end are at rest for good, of mass one; then addresses, of the packed sand, and of the counters of WORK."""
 WORK: Final = np.dtype([("evaluations", "f8"), ("derivatives", "f8"), ("unsolved", "f8")])
 """The cost of solutions, counted up: evaluations of every body's force, of its derivative, and equations unsolved."""
 NUMBERS: Final = np.dtype(
@@ -146,9 +147,9 @@ row_moved = _T.vector("nrow")
 row_tried = _T.vector("nrow")
 """Scratch: J a - aref on the way along a direction, (nrow,)."""
 
-# The equation. Its matrices have the pattern of `coupled`; what lies outside of that is never read.
+# The equation. Its matrices are those of `matrices`.
 coupled = _T.vectors("ndof", "ndof", view=int64s)
-"""The degrees of freedom before one that a matrix couples it to, rising, int64, of which `coupled_length` count."""
+"""The degrees of freedom before one that a large matrix couples it to, rising, int64, of which `coupled_length` count."""
 coupled_length = _T.vector("ndof", int64s)
 """Number of them, int64, (ndof,)."""
 mass = _T.matrix("ndof", "ndof")
@@ -186,6 +187,12 @@ linear = _T.matrix("ndof", "ndof")
 """Scratch: M - h J' G J, G the sand's derivatives, (ndof, ndof)."""
 linear_factors = _T.matrix("ndof", "ndof")
 """Scratch: factors of the same with the rows' stiffness, (ndof, ndof)."""
+twists = _T.matrix(WRENCH, "ndof")
+"""Scratch: -h times the twists of a body by the degrees of freedom of its path, row by row of a width, (6, ndof)."""
+wrenches = _T.matrix(WRENCH, "ndof")
+"""Scratch: the wrenches that follow from these, likewise, (6, ndof)."""
+power = _T.vector("ndof")
+"""Scratch: their power on one degree of freedom of the path, (ndof,)."""
 change = _T.vector("ndof")
 """Scratch: a velocity change v+ - v, or an impulse, (ndof,)."""
 seen = _T.vector("ndof")

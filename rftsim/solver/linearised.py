@@ -4,9 +4,10 @@ from typing import Final
 
 from rftsim.law.layout import WRENCH
 from rftsim.law.stress import TINY
+from rftsim.machine import lanes
 from rftsim.machine.compiling import exact, fast
-from rftsim.machine.memory import doubles, peek, poke, stack_doubles
-from rftsim.solver import constraint_rows, equation, linear_algebra, sparse
+from rftsim.machine.memory import doubles, peek, poke
+from rftsim.solver import constraint_rows, equation, linear_algebra, matrices
 
 NONE: Final = 0
 EXACT: Final = 1
@@ -38,18 +39,32 @@ def _is_zero(g):
 @fast
 def _add_derivative(p, b, g, a):
     """Add -h J' G J to a matrix, G the derivative of body b's wrench by its twist."""
-    path, n, h, ndof = equation.path(p, b), equation.path_length(p)[b], equation.numbers(p).h, a.shape[0]
-    out, wrench = doubles(a.ctypes.data, a.size), doubles(stack_doubles(6), 6)
+    path, n, ndof = equation.path(p, b), equation.path_length(p)[b], a.shape[0]
+    out, width, power = doubles(a.ctypes.data, a.size), lanes.padded(n), equation.power(p)
+    twists = doubles(equation.twists(p).ctypes.data, WRENCH * width)
+    wrenches = doubles(equation.wrenches(p).ctypes.data, WRENCH * width)
+    _turn(p, b, n, width, twists)
+    for r in range(WRENCH):
+        lanes.combine_six(g[r], twists, width, wrenches[r * width : (r + 1) * width])
+    for i in range(n):
+        lanes.combine_six(equation.motion(p, b, i), wrenches, width, power)
+        row = ndof * peek(path, i)
+        for k in range(n):
+            at = row + peek(path, k)
+            poke(out, at, peek(out, at) + peek(power, k))
+
+
+@fast
+def _turn(p, b, n, width, out):
+    """Fill out with -h J of body b: six rows of a width, zero behind its n degrees of freedom."""
+    h = equation.numbers(p).h
     for k in range(n):
         m = equation.motion(p, b, k)
-        for r in range(6):
-            along = g[r, 0] * m[0] + g[r, 1] * m[1] + g[r, 2] * m[2]
-            wrench[r] = -h * (along + g[r, 3] * m[3] + g[r, 4] * m[4] + g[r, 5] * m[5])
-        x, y, z, u, v, w = wrench[0], wrench[1], wrench[2], wrench[3], wrench[4], wrench[5]
-        for i in range(n):
-            j, at = equation.motion(p, b, i), ndof * peek(path, i) + peek(path, k)
-            power = j[0] * x + j[1] * y + j[2] * z + j[3] * u + j[4] * v + j[5] * w
-            poke(out, at, peek(out, at) + power)
+        for r in range(WRENCH):
+            poke(out, r * width + k, -h * m[r])
+    for k in range(n, width):
+        for r in range(WRENCH):
+            poke(out, r * width + k, 0.0)
 
 
 @exact
@@ -59,7 +74,7 @@ def _linearise(p, which):
     if which == EXACT and numbers.is_linearised > 0.0:
         return
     numbers.is_linearised, numbers.is_factored = 1.0 if which == EXACT else 0.0, 0.0
-    sparse.copy(p, equation.mass(p), a)
+    matrices.copy(p, equation.mass(p), a)
     if which == NONE:
         return
     for b in range(equation.head(p).nbody):
@@ -77,15 +92,15 @@ def _factor(p, x, force):
     """
     a, linear = equation.linear_factors(p), equation.linear(p)
     if equation.head(p).nrow == 0:
-        sparse.copy(p, linear, a)
+        matrices.copy(p, linear, a)
     else:
-        sparse.copy(p, equation.plain_mass(p), a)
+        matrices.copy(p, equation.plain_mass(p), a)
         share, h = equation.late_share(p), equation.numbers(p).h
         for k in range(share.size):
             share[k] = 1.0 / (1.0 + h * max(equation.drag(p)[k, k], 0.0) * equation.lightness(p)[k])
-        sparse.add_difference(p, linear, equation.mass(p), share, a)
+        matrices.add_difference(p, linear, equation.mass(p), share, a)
         constraint_rows.add_stiffness(p, x, force, a)
-    sparse.factor(p, a)
+    matrices.factor(p, a)
     equation.numbers(p).is_factored = 1.0
 
 
@@ -93,12 +108,12 @@ def _factor(p, x, force):
 def substitute(p, impulse, seen, out):
     """Fill out with the velocity change by an impulse, by the last factors, and seen with the one that rows see."""
     slowed = equation.slowed(p)
-    sparse.substitute(p, equation.linear_factors(p), impulse, seen)
+    matrices.substitute(p, equation.linear_factors(p), impulse, seen)
     if not is_indirect(p):
         linear_algebra.copy(seen, out)
         return
-    sparse.multiply(p, equation.plain_mass(p), seen, slowed)
-    sparse.substitute(p, equation.mass_factors(p), slowed, out)
+    matrices.multiply(p, equation.plain_mass(p), seen, slowed)
+    matrices.substitute(p, equation.mass_factors(p), slowed, out)
 
 
 @exact
@@ -120,7 +135,7 @@ def solution(p, v, errors, residual, which, out):
     direction, nothing = equation.direction(p), equation.missing(p)
     if equation.numbers(p).is_factored == 0.0:
         _factor(p, nothing, nothing)
-    sparse.substitute(p, equation.linear_factors(p), residual, direction)
+    matrices.substitute(p, equation.linear_factors(p), residual, direction)
     for k in range(v.size):
         out[k] = v[k] - direction[k]
 
@@ -152,7 +167,7 @@ def _solve_with_rows(p, v, errors, residual, which, out):
         if constraint_rows.note_zones(p, x) or numbers.is_factored == 0.0:
             _factor(p, x, force)
         _fill_direction(p)
-        sparse.multiply(p, equation.linear(p), taken, change)
+        matrices.multiply(p, equation.linear(p), taken, change)
         stiff, slope = linear_algebra.dot(direction, change), linear_algebra.dot(direction, fixed)
         for i in range(moved.size):
             moved[i] = constraint_rows.product(p, i, direction)

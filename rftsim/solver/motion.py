@@ -6,6 +6,7 @@ All twists and wrenches are about the body's origin, in world axes: velocity or 
 import numpy as np
 
 from rftsim.law import exports, step_frame
+from rftsim.machine import lanes
 from rftsim.machine.compiling import exact, fast
 from rftsim.machine.memory import doubles, peek, poke, stack_doubles
 from rftsim.solver import equation, linear_algebra
@@ -14,12 +15,7 @@ from rftsim.solver import equation, linear_algebra
 @fast
 def twist_of(p, b, v, out):
     """Fill out with the twist of body b at a generalised velocity, (6,)."""
-    path, a, c, d, e, f, g = equation.path(p, b), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for k in range(equation.path_length(p)[b]):
-        y, j = peek(v, peek(path, k)), equation.motion(p, b, k)
-        a, c, d = a + j[0] * y, c + j[1] * y, d + j[2] * y
-        e, f, g = e + j[3] * y, f + j[4] * y, g + j[5] * y
-    out[0], out[1], out[2], out[3], out[4], out[5] = a, c, d, e, f, g
+    lanes.gather(equation.path(p, b), v, equation.motion(p, b, 0), equation.path_length(p)[b], out)
 
 
 @exact

@@ -6,7 +6,7 @@ import numpy as np
 
 from rftsim.law.stress import TINY
 from rftsim.machine.compiling import exact
-from rftsim.solver import constraint_rows, equation, linear_algebra, sparse
+from rftsim.solver import constraint_rows, equation, linear_algebra, matrices
 from rftsim.solver.motion import evaluate, generalised, speed_of
 
 AT_REST: Final = 0.1
@@ -17,7 +17,7 @@ AT_REST: Final = 0.1
 def size(p, impulse):
     """Length of an impulse in the mass metric; leaves the velocity change by it in `equation.solved`."""
     solved = equation.solved(p)
-    sparse.substitute(p, equation.mass_factors(p), impulse, solved)
+    matrices.substitute(p, equation.mass_factors(p), impulse, solved)
     return np.sqrt(max(linear_algebra.dot(impulse, solved), 0.0))
 
 
@@ -31,7 +31,7 @@ def fill(p, v, x, q, out):
     start, tau, change = equation.start(p), equation.force(p), equation.change(p)
     for k in range(v.size):
         change[k] = v[k] - start[k]
-    sparse.multiply(p, equation.mass(p), change, out)
+    matrices.multiply(p, equation.mass(p), change, out)
     for k in range(v.size):
         out[k] -= h * (tau[k] + q[k])
     linear_algebra.clear(change)

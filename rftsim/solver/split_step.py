@@ -12,7 +12,7 @@ import numpy as np
 
 from rftsim.law.stress import TINY
 from rftsim.machine.compiling import exact
-from rftsim.solver import constraint_rows, equation, linear_algebra, sparse
+from rftsim.solver import constraint_rows, equation, linear_algebra, matrices
 from rftsim.solver.equation import KIND, POINT
 from rftsim.solver.motion import felt_twist, generalised, speed_of
 from rftsim.solver.newton import hold, solve
@@ -40,12 +40,12 @@ def parts_needed(p, time):
     grown, late, stopped = equation.grown(p), equation.late(p), equation.stopped(p)
     pressed = equation.pressed(p)
     generalised(p, POINT.best, 1, grown)
-    sparse.substitute(p, equation.mass_factors(p), grown, pressed)
+    matrices.substitute(p, equation.mass_factors(p), grown, pressed)
     generalised(p, POINT.best, 0, late)
     for k in range(after.size):
         grown[k] = time * (grown[k] - late[k])
         stopped[k] = after[k] - start[k]
-    sparse.substitute(p, equation.mass_factors(p), grown, late)
+    matrices.substitute(p, equation.mass_factors(p), grown, late)
     worst = _position_error(p, time)
     return np.ceil(np.sqrt(worst) * h / time) if worst > (time / h) ** 2 else 1.0
 
@@ -141,7 +141,7 @@ def _solve_part(p, drift, part):
     force, smooth = equation.force(p), equation.smooth_force(p)
     linear_algebra.copy(smooth, force)
     if equation.numbers(p).dragged > 0.0:
-        sparse.multiply(p, equation.drag(p), kicked, force)
+        matrices.multiply(p, equation.drag(p), kicked, force)
         for k in range(force.size):
             force[k] = smooth[k] - force[k]
     solve(p)

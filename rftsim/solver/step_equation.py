@@ -1,7 +1,7 @@
 """The equation of a whole step as MuJoCo sees it, and the force that makes its step end at a given velocity."""
 
 from rftsim.machine.compiling import exact
-from rftsim.solver import constraint_rows, equation, linear_algebra, linearised, residual, sparse
+from rftsim.solver import constraint_rows, equation, linear_algebra, linearised, matrices, residual
 
 
 @exact
@@ -9,11 +9,11 @@ def prepare(p, h):
     """Set the equation's mass and its factors, and its step, for a time h."""
     numbers, mass, factors = equation.numbers(p), equation.mass(p), equation.mass_factors(p)
     numbers.h, numbers.is_linearised = h, 0.0
-    sparse.copy(p, equation.plain_mass(p), mass)
+    matrices.copy(p, equation.plain_mass(p), mass)
     if numbers.dragged > 0.0:
-        sparse.add(p, equation.drag(p), h, mass)
-    sparse.copy(p, mass, factors)
-    sparse.factor(p, factors)
+        matrices.add(p, equation.drag(p), h, mass)
+    matrices.copy(p, mass, factors)
+    matrices.factor(p, factors)
 
 
 @exact

@@ -11,7 +11,7 @@ from numba import types
 from rftsim.machine.compiling import exact
 from rftsim.machine.exports import address, entry
 from rftsim.machine.memory import doubles, stack_doubles
-from rftsim.solver import equation, linear_algebra, sparse
+from rftsim.solver import equation, linear_algebra, matrices
 from rftsim.solver.equation import POINT
 from rftsim.solver.motion import size_of, twist_of
 from rftsim.solver.newton import STRAIN, solve
@@ -34,7 +34,7 @@ def step(p):
     """The sand's generalised force of one step: fills `out`, `wrench`, and what is kept for the next one; counts."""
     numbers, v, momentum = equation.numbers(p), equation.velocity(p), equation.momentum(p)
     linear_algebra.copy(equation.frames(p), equation.first_frames(p))
-    sparse.multiply(p, equation.plain_mass(p), v, momentum)
+    matrices.multiply(p, equation.plain_mass(p), v, momentum)
     allowed = GAIN * linear_algebra.dot(v, momentum) + 1e-12
     work, slack = 0.0, 0.0
     for most_parts in MOST_PARTS:
@@ -122,7 +122,7 @@ def _take_back(p, allowed, work):
     h, q, answer = equation.numbers(p).timestep, equation.out(p), equation.end(p)
     wrench, changed = equation.all_wrenches(p), equation.momentum(p)
     # the force's own share of the work, and the rest's: where there are no constraints, they cancel at once
-    sparse.substitute(p, equation.mass_factors(p), q, changed)
+    matrices.substitute(p, equation.mass_factors(p), q, changed)
     own = 0.5 * h * linear_algebra.dot(q, changed)
     rest = work / h - own
     share = 0.0 if rest >= 0.0 else min(1.0, -rest / own)
