@@ -6,7 +6,7 @@ from rftsim.engine import external, islands
 from rftsim.engine.layout import CONSTANTS
 from rftsim.machine.compiling import exact, inline
 from rftsim.machine.memory import doubles, int32s, matrix, pointer
-from rftsim.solver import constraint_rows, equation, matrices, sparse
+from rftsim.solver import constraint_rows, equation, pattern
 from rftsim.solver.equation import KIND
 
 _K: Final = 0
@@ -148,6 +148,6 @@ def fill_rows(model, data, contact, m, d, i, island, p):
             _join_cone(p, at, last)
         for row in range(at, last):
             path, length = equation.row_path(p, row), equation.row_length(p)[row]
-            if length > 1 and not matrices.is_small(p):
-                sparse.join(p, path[length - 1], path, length - 1)
+            for k in range(length - 1 if not pattern.is_small(p) else 0, 0, -1):
+                pattern.couple(p, path[k], path[k - 1])
         at = last

@@ -7,8 +7,6 @@ island of bodies that has one near the sand is then solved for alone, see `islan
 
 from typing import Final
 
-import numpy as np
-
 from rftsim.engine import bodies, constraints, external, instance, islands
 from rftsim.engine.layout import CONSTANTS
 from rftsim.engine.refusals import WHY
@@ -17,7 +15,7 @@ from rftsim.law.body import bed_of, header_at
 from rftsim.machine import lanes
 from rftsim.machine.compiling import inline
 from rftsim.machine.memory import doubles, int32s, pointer, release, stack_doubles, take
-from rftsim.solver import equation, linear_algebra, matrices, sparse, state, time_step
+from rftsim.solver import equation, linear_algebra, matrices, pattern, state, time_step
 from rftsim.solver.equation import TABLE, WORK
 from rftsim.solver.motion import size_of
 from rftsim.solver.sinking import is_near
@@ -95,6 +93,15 @@ def _compute_drives(model, data, m, d, t, i):
 
 
 @inline
+def _fill_parents(t, i, island, p):
+    """Fill what the tree couples each degree of freedom of an island to; constraints may couple more."""
+    place, dofs, first, parent = islands.place_of(i), islands.dofs(i), islands.dof_start(i)[island], equation.parent(p)
+    for k in range(parent.size):
+        above = t.dof_parent[dofs[first + k]] if k < islands.dof_count(i)[island] else pattern.NONE
+        parent[k] = place[above] if above >= 0 else pattern.NONE
+
+
+@inline
 def _fill_bodies(model, m, t, address, old, i, island, p):
     """Fill the bodies of an island's equation, and what their motion couples."""
     nv, place, first = islands.head(i).nv, islands.place_of(i), islands.body_start(i)[island]
@@ -113,8 +120,6 @@ def _fill_bodies(model, m, t, address, old, i, island, p):
             path[at] = place[dof]
             bodies.motion_by(t, body, dof, equation.motion(p, b, at))
             dof = t.dof_parent[dof]
-        if n > 1 and not matrices.is_small(p):
-            sparse.join(p, path[n - 1], path, n - 1)
         linear_algebra.copy(t.xmat[9 * body : 9 * body + 9], r)
         bodies.twist(t, body, v, w)
         x = t.xpos[3 * body : 3 * body + 3].ctypes.data
@@ -128,46 +133,21 @@ def _fill_bodies(model, m, t, address, old, i, island, p):
 
 
 @inline
-def _couple(number, start, column, i, island, p):
-    """Couple what a matrix of MuJoCo's couples below its diagonal: so many columns of each row, from a start."""
-    place, dofs, first = islands.place_of(i), islands.dofs(i), islands.dof_start(i)[island]
-    for k in range(islands.dof_count(i)[island]):
-        dof, known = dofs[first + k], np.int64(0)
-        for entry in range(start[dof], start[dof] + number[dof]):
-            if column[entry] < dof:
-                known = sparse.couple_on(p, k, place[column[entry]], known)
-
-
-@inline
-def _fill_pattern(model, m, i, island, p):
-    """Couple what MuJoCo's own matrices couple, and what elimination then fills in; rows and bodies did theirs."""
-    nv = islands.head(i).nv
-    number, start = int32s(pointer(m + model.M_rownnz), nv), int32s(pointer(m + model.M_rowadr), nv)
-    total = start[nv - 1] + number[nv - 1]
-    _couple(number, start, int32s(pointer(m + model.M_colind), total), i, island, p)
-    if int32s(m + model.opt_integrator, 1)[0] != _EULER:
-        number, start = int32s(pointer(m + model.D_rownnz), nv), int32s(pointer(m + model.D_rowadr), nv)
-        total = start[nv - 1] + number[nv - 1]
-        _couple(number, start, int32s(pointer(m + model.D_colind), total), i, island, p)
-    sparse.close(p)
-
-
-@inline
 def _fill_mass(model, data, m, d, i, island, p):
     """Fill the mass matrix of an island, from its lower triangle in rows; its pattern is there."""
     nv, place, dofs, first = islands.head(i).nv, islands.place_of(i), islands.dofs(i), islands.dof_start(i)[island]
     number, start = int32s(pointer(m + model.M_rownnz), nv), int32s(pointer(m + model.M_rowadr), nv)
     total = start[nv - 1] + number[nv - 1]
     column, value = int32s(pointer(m + model.M_colind), total), doubles(pointer(d + data.M), total)
-    out = equation.plain_mass(p)
+    out, n = equation.plain_mass(p), equation.head(p).ndof
     matrices.clear(p, out)
     for k in range(islands.dof_count(i)[island]):
         dof = dofs[first + k]
         for entry in range(start[dof], start[dof] + number[dof]):
             other = place[column[entry]]
-            out[k, other] = out[other, k] = value[entry]
-    for k in range(islands.dof_count(i)[island], out.shape[0]):
-        out[k, k] = 1.0
+            out[n * k + other] = out[n * other + k] = value[entry]
+    for k in range(islands.dof_count(i)[island], n):
+        out[(n + 1) * k] = 1.0
 
 
 @inline
@@ -176,13 +156,13 @@ def _fill_drag(model, data, m, d, i, island, p):
     nv, place, dofs, first = islands.head(i).nv, islands.place_of(i), islands.dofs(i), islands.dof_start(i)[island]
     out, numbers, integrator = equation.drag(p), equation.numbers(p), int32s(m + model.opt_integrator, 1)[0]
     matrices.clear(p, out)
-    numbers.dragged = 0.0
+    numbers.dragged, n = 0.0, equation.head(p).ndof
     if integrator == _EULER:
         if int32s(m + model.opt_disableflags, 1)[0] & _UNDAMPED == 0:
             damping = doubles(pointer(m + model.dof_damping), nv)
             for k in range(islands.dof_count(i)[island]):
-                out[k, k] = damping[dofs[first + k]]
-                numbers.dragged = 1.0 if out[k, k] != 0.0 else numbers.dragged
+                out[(n + 1) * k] = damping[dofs[first + k]]
+                numbers.dragged = 1.0 if damping[dofs[first + k]] != 0.0 else numbers.dragged
         return
     number, start = int32s(pointer(m + model.D_rownnz), nv), int32s(pointer(m + model.D_rowadr), nv)
     total = start[nv - 1] + number[nv - 1]
@@ -193,9 +173,9 @@ def _fill_drag(model, data, m, d, i, island, p):
             j = column[entry]
             numbers.dragged = 1.0 if value[entry] != 0.0 else numbers.dragged
             if integrator == _IMPLICIT or j == dof:
-                out[k, place[j]] = -value[entry]
+                out[n * k + place[j]] = -value[entry]
             elif j < dof:  # implicitfast takes the lower triangle for both
-                out[k, place[j]] = out[place[j], k] = -value[entry]
+                out[n * k + place[j]] = out[n * place[j] + k] = -value[entry]
 
 
 @inline
@@ -212,8 +192,7 @@ def _fill_dofs(model, data, m, d, old, i, island, p):
     for k in range(count, equation.head(p).ndof):
         equation.velocity(p)[k] = equation.lacking(p)[k] = equation.smooth_force(p)[k] = 0.0
         equation.lightness(p)[k] = 1.0
-    if not matrices.is_small(p):
-        _fill_pattern(model, m, i, island, p)
+    pattern.find(p)
     _fill_mass(model, data, m, d, i, island, p)
     _fill_drag(model, data, m, d, i, island, p)
     if equation.head(p).nrow > 0 and equation.numbers(p).dragged > 0.0:
@@ -256,8 +235,7 @@ def _solve(model, data, contact, m, d, t, address, sand, old, new, i, island):
     numbers.tolerance, numbers.iterations = bed.tolerance, bed.iterations
     numbers.drift = numbers.parts = 0.0
     numbers.timestep, numbers.started = doubles(m + model.opt_timestep, 1)[0], state.started(old)[0]
-    for k in range(lanes.padded(counts[1])):
-        equation.coupled_length(p)[k] = 0
+    _fill_parents(t, i, island, p)
     _fill_bodies(model, m, t, address, old, i, island, p)
     constraints.fill_rows(model, data, contact, m, d, i, island, p)
     _fill_dofs(model, data, m, d, old, i, island, p)

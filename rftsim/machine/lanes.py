@@ -1,8 +1,10 @@
-"""Loops over vectors of LANES numbers at once, for sizes that are multiples of it: at these the optimiser's own are slow.
+"""Loops over vectors of LANES numbers at once, for sizes that are multiples of it, where the optimiser's own are slow.
 
 A loop of a dozen rounds that is made into vectors as it is written spends its time in what is left over at the end.
 """
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any, Final
 
 from llvmlite import ir
@@ -152,25 +154,162 @@ def _set(builder: Any, numbers: Any, place: Any, value: float) -> Any:
 
 @intrinsic
 def add_to_rows(
-    typing_context: Any, shares: Any, starts: Any, count: Any, a: Any, row: Any, column: Any, k: Any
+    typing_context: Any, shares: Any, rows: Any, count: Any, a: Any, start: Any, n: Any, column: Any, k: Any
 ) -> Any:
-    """Add LANES numbers of the row of a that starts at one place, from a column on, to so many others, by shares.
+    """Add LANES numbers from a column on, of the row that starts at one place of a, to so many rows, each by a share.
 
-    What the others have in column k is taken for zero.
+    What those have in column k is taken for zero. Rows are of n numbers.
     """
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        factors, places, matrix = (_data(context, builder, signature, arguments, k) for k in (0, 1, 3))
-        numbers, lane = _load(builder, matrix, builder.add(arguments[4], arguments[5])), arguments[6]
-        lane = builder.sub(lane, arguments[5])
-        with cgutils.for_range(builder, arguments[2]) as each:
-            place = builder.add(builder.load(_at(builder, places, each.index)), arguments[5])
-            factor = _spread(builder, builder.load(_at(builder, factors, each.index)))
-            product = builder.fmul(factor, numbers, flags=_FUSED)
+        factors, indices, matrix = (_data(context, builder, signature, arguments, k) for k in (0, 1, 3))
+        _, _, count, _, start, size, column, cleared = arguments
+        numbers, lane = _load(builder, matrix, builder.add(start, column)), builder.sub(cleared, column)
+        with cgutils.for_range(builder, count) as each:
+            row = builder.mul(builder.load(_at(builder, indices, each.index)), size)
+            place, factor = builder.add(row, column), builder.load(_at(builder, factors, each.index))
+            product = builder.fmul(_spread(builder, factor), numbers, flags=_FUSED)
             known = _set(builder, _load(builder, matrix, place), lane, 0.0)
             _store(builder, builder.fadd(known, product, flags=_FUSED), matrix, place)
 
-    return types.void(shares, starts, types.intp, a, types.intp, types.intp, types.intp), generate
+    return types.void(shares, rows, types.intp, a, *[types.intp] * 4), generate
+
+
+@intrinsic
+def combine_rows(
+    typing_context: Any, shares: Any, rows: Any, ends: Any, a: Any, n: Any, column: Any, k: Any, weight: Any
+) -> Any:
+    """Fill LANES numbers of row k of a, from a column on, with the sum of those of others, each by a share, weighted.
+
+    Row k itself adds a one in column k. `ends` says from which of the others on, and up to which; rows are of n.
+    """
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        factors, indices, matrix = (_data(context, builder, signature, arguments, k) for k in (0, 1, 3))
+        _, _, ends, _, size, column, own, weight = arguments
+        first, last = builder.extract_value(ends, 0), builder.extract_value(ends, 1)
+        total = _sum(builder)
+        with cgutils.for_range_slice(builder, first, last, _number(1), _WORD) as (index, _):
+            row = builder.mul(builder.load(_at(builder, indices, index)), size)
+            factor = _spread(builder, builder.load(_at(builder, factors, index)))
+            _add_product(builder, factor, _load(builder, matrix, builder.add(row, column)), total)
+        known = _set(builder, builder.load(total), builder.sub(own, column), 1.0)
+        place = builder.add(builder.mul(own, size), column)
+        _store(builder, builder.fmul(_spread(builder, weight), known), matrix, place)
+
+    pair = types.UniTuple(types.intp, 2)
+    return types.void(shares, rows, pair, a, *[types.intp] * 3, types.float64), generate
+
+
+def _each(builder: Any, columns: Any, count: Any) -> Any:
+    """A loop over so many columns of a list."""
+
+    @contextmanager
+    def loop() -> Iterator[Any]:
+        with cgutils.for_range(builder, count) as each:
+            yield builder.load(_at(builder, columns, each.index))
+
+    return loop()
+
+
+@intrinsic
+def multiply_at(typing_context: Any, columns: Any, count: Any, a: Any, row: Any, n: Any, x: Any, out: Any) -> Any:
+    """Fill LANES numbers of out with the products of as many rows of a, of n numbers, and x, from a row on.
+
+    LANES columns from each of so many on are read, no others.
+    """
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        places, matrix, vector, target = (_data(context, builder, signature, arguments, k) for k in (0, 2, 5, 6))
+        _, count, _, row, size, _, _ = arguments
+        sums = [_sum(builder) for _ in range(LANES)]
+        starts = [builder.mul(builder.add(row, _number(k)), size) for k in range(LANES)]
+        with _each(builder, places, count) as column:
+            factor = _load(builder, vector, column)
+            for start, total in zip(starts, sums, strict=True):
+                _add_product(builder, _load(builder, matrix, builder.add(start, column)), factor, total)
+        _store(builder, _across(builder, [builder.load(total) for total in sums]), target, row)
+
+    return types.void(columns, types.intp, a, types.intp, types.intp, x, out), generate
+
+
+@intrinsic
+def dot_at(typing_context: Any, columns: Any, count: Any, a: Any, start: Any, x: Any) -> Any:
+    """The scalar product of x and a row of a that starts at a place, of LANES columns from each of so many on."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        places, matrix, vector = (_data(context, builder, signature, arguments, k) for k in (0, 2, 4))
+        total = _sum(builder)
+        with _each(builder, places, arguments[1]) as column:
+            numbers = _load(builder, matrix, builder.add(arguments[3], column))
+            _add_product(builder, numbers, _load(builder, vector, column), total)
+        numbers = builder.load(total)
+        halves = [_shuffled(builder, numbers, numbers, places) for places in ([0, 1], [2, 3])]
+        both = builder.fadd(*halves, flags=("fast",))
+        ends = [builder.extract_element(both, ir.Constant(ir.IntType(32), k)) for k in range(2)]
+        return builder.fadd(*ends, flags=("fast",))
+
+    return types.float64(columns, types.intp, a, types.intp, x), generate
+
+
+@intrinsic
+def add_at(typing_context: Any, share: Any, columns: Any, count: Any, a: Any, start: Any, out: Any, at: Any) -> Any:
+    """Add a share of a row of a to one of out, which start at two places, in LANES columns from each of so many on."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        places, matrix, target = (_data(context, builder, signature, arguments, k) for k in (1, 3, 5))
+        factor = _spread(builder, arguments[0])
+        with _each(builder, places, arguments[2]) as column:
+            place = builder.add(arguments[6], column)
+            product = builder.fmul(factor, _load(builder, matrix, builder.add(arguments[4], column)), flags=_FUSED)
+            _store(builder, builder.fadd(_load(builder, target, place), product, flags=_FUSED), target, place)
+
+    return types.void(types.float64, columns, types.intp, a, types.intp, out, types.intp), generate
+
+
+@intrinsic
+def add_difference_at(
+    typing_context: Any, shares: Any, columns: Any, count: Any, a: Any, b: Any, start: Any, out: Any
+) -> Any:
+    """Add a row of a less that of b to that of out, each column by a share, in LANES columns from each of so many on."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        factors, places, one, other, target = (
+            _data(context, builder, signature, arguments, k) for k in (0, 1, 3, 4, 6)
+        )
+        with _each(builder, places, arguments[2]) as column:
+            place = builder.add(arguments[5], column)
+            change = builder.fsub(_load(builder, one, place), _load(builder, other, place))
+            product = builder.fmul(_load(builder, factors, column), change, flags=_FUSED)
+            _store(builder, builder.fadd(_load(builder, target, place), product, flags=_FUSED), target, place)
+
+    return types.void(shares, columns, types.intp, a, b, types.intp, out), generate
+
+
+@intrinsic
+def copy_at(typing_context: Any, columns: Any, count: Any, a: Any, start: Any, out: Any) -> Any:
+    """Copy a row of a, which starts at a place, to the same place of out, in LANES columns from each of so many on."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        places, matrix, target = (_data(context, builder, signature, arguments, k) for k in (0, 2, 4))
+        with _each(builder, places, arguments[1]) as column:
+            place = builder.add(arguments[3], column)
+            _store(builder, _load(builder, matrix, place), target, place)
+
+    return types.void(columns, types.intp, a, types.intp, out), generate
+
+
+@intrinsic
+def clear_at(typing_context: Any, columns: Any, count: Any, out: Any, start: Any) -> Any:
+    """Set a row of out, which starts at a place, to zero in LANES columns from each of so many on."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        places, target = (_data(context, builder, signature, arguments, k) for k in (0, 2))
+        nothing = ir.Constant(ir.VectorType(ir.DoubleType(), LANES), [0.0] * LANES)
+        with _each(builder, places, arguments[1]) as column:
+            _store(builder, nothing, target, builder.add(arguments[3], column))
+
+    return types.void(columns, types.intp, out, types.intp), generate
 
 
 @intrinsic

@@ -85,6 +85,16 @@ class Table:
 
         return vector if columns is None else one, flat
 
+    def matrices(self, count: int, rows: Size, columns: Size) -> Any:
+        """Declare so many matrices, one behind another, and make what gives all their numbers from p, flat."""
+        entry, m, n = self._declare(count, rows, columns), self._number(rows), self._number(columns)
+
+        @exact
+        def get(p):
+            return doubles(_address(p, entry), count * m(p) * n(p))
+
+        return get
+
     def record(self, dtype: "np.dtype[Any]") -> Any:
         """Declare a record of float64, and make what gives it from p."""
         return record_behind(dtype, self._declare(dtype.itemsize // 8))

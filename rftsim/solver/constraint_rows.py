@@ -167,11 +167,11 @@ def note_zones(p, x):
 def _add_product(p, r, k, share, a):
     """Add a share of the product of rows r and k to a matrix."""
     rows, columns, left, right = equation.row_path(p, r), equation.row_path(p, k), equation.row_jacobian(p, r), 0.0
-    j = equation.row_jacobian(p, k)
+    j, n = equation.row_jacobian(p, k), equation.head(p).ndof
     for m in range(equation.row_length(p)[k]):
         right = share * j[m]
         for i in range(equation.row_length(p)[r]):
-            a[rows[i], columns[m]] += left[i] * right
+            a[n * rows[i] + columns[m]] += left[i] * right
 
 
 @exact
@@ -198,7 +198,7 @@ def _add_sliding(p, x, first, last, normal, tangential, a):
 
 @exact
 def add_stiffness(p, x, force, a):
-    """Add J' H J to a matrix (ndof, ndof), H the derivative of the rows' forces at x, sign reversed."""
+    """Add J' H J to a matrix (ndof^2,), H the derivative of the rows' forces at x, sign reversed."""
     kind, stiffness, bound = equation.row_kind(p), equation.row_stiffness(p), equation.row_bound(p)
     i = np.int64(0)  # no constant, for which numba would compile what takes it anew
     while i < kind.size:

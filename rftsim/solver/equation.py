@@ -147,17 +147,39 @@ row_moved = _T.vector("nrow")
 row_tried = _T.vector("nrow")
 """Scratch: J a - aref on the way along a direction, (nrow,)."""
 
-# The equation. Its matrices are those of `matrices`.
-coupled = _T.vectors("ndof", "ndof", view=int64s)
-"""The degrees of freedom before one that a large matrix couples it to, rising, int64, of which `coupled_length` count."""
-coupled_length = _T.vector("ndof", int64s)
+# The equation. Its matrices are of the pattern that `pattern` makes.
+parent = _T.vector("ndof", int64s)
+"""The last degree of freedom before one that a large matrix couples it to, or -1, int64, (ndof,); see `pattern`."""
+ancestors = _T.vectors("ndof", "ndof", view=int64s)
+"""All before one that it is coupled to, rising, int64, of which `ancestor_count` count."""
+ancestor_count = _T.vector("ndof", int64s)
 """Number of them, int64, (ndof,)."""
-mass = _T.matrix("ndof", "ndof")
-"""M_h: the mass matrix with what the integrator takes implicitly, (ndof, ndof)."""
-mass_factors = _T.matrix("ndof", "ndof")
-"""Factors of `mass`, (ndof, ndof)."""
-plain_factors = _T.matrix("ndof", "ndof")
-"""Factors of `plain_mass` where there are rows and drag, (ndof, ndof)."""
+columns = _T.vectors("ndof", "ndof", view=int64s)
+"""The first columns of the blocks that hold these and the diagonal, rising, int64, of which `column_count` count."""
+first_in = _T.vectors("ndof", "ndof", view=int64s)
+"""Which of the ancestors is the first in such a block, int64."""
+column_count = _T.vector("ndof", int64s)
+"""Number of these blocks, int64, (ndof,)."""
+blocks = _T.vectors("ndof", "ndof", view=int64s)
+"""The first columns of all blocks that LANES rows from one on have, rising, int64, of which `block_count` count."""
+block_count = _T.vector("ndof", int64s)
+"""Number of them, int64, (ndof,)."""
+is_block = _T.vectors("ndof", "ndof", view=int64s)
+"""Scratch: whether there is one from a row and a column on, int64."""
+pivots = _T.vector("ndof")
+"""Scratch: inverse pivots of a matrix that is being factored, (ndof,)."""
+shares = _T.vector("ndof")
+"""Scratch: what a row of its inverse takes of those before, (ndof,)."""
+others_shares = _T.vector("ndof")
+"""Scratch: the same of the other triangle's, (ndof,)."""
+between = _T.vector("ndof")
+"""Scratch: what the first factor's inverse makes of an impulse, (ndof,)."""
+mass = _T.matrices(1, "ndof", "ndof")
+"""M_h: the mass matrix with what the integrator takes implicitly, (ndof^2,)."""
+mass_factors = _T.matrices(2, "ndof", "ndof")
+"""Factors of `mass`, (2 ndof^2,)."""
+plain_factors = _T.matrices(2, "ndof", "ndof")
+"""Factors of `plain_mass` where there are rows and drag, (2 ndof^2,)."""
 lightness = _T.vector("ndof")
 """About the diagonal of M^-1, (ndof,)."""
 start = _T.vector("ndof")
@@ -183,10 +205,10 @@ scores = _T.records(SCORES, _POINTS)
 _wrenches_of = _T.vectors(WRENCH, _POINTS, "nbody", 2)
 end = _T.vector("ndof")
 """Generalised velocity at the end of the step, (ndof,)."""
-linear = _T.matrix("ndof", "ndof")
-"""Scratch: M - h J' G J, G the sand's derivatives, (ndof, ndof)."""
-linear_factors = _T.matrix("ndof", "ndof")
-"""Scratch: factors of the same with the rows' stiffness, (ndof, ndof)."""
+linear = _T.matrices(1, "ndof", "ndof")
+"""Scratch: M - h J' G J, G the sand's derivatives, (ndof^2,)."""
+linear_factors = _T.matrices(2, "ndof", "ndof")
+"""Scratch: factors of the same with the rows' stiffness, (2 ndof^2,)."""
 twists = _T.matrix(WRENCH, "ndof")
 """Scratch: -h times the twists of a body by the degrees of freedom of its path, row by row of a width, (6, ndof)."""
 wrenches = _T.matrix(WRENCH, "ndof")
@@ -229,10 +251,10 @@ filtered = _T.vector("ndof")
 """Scratch: the velocity change by that impulse, (ndof,)."""
 
 # The step that the equation is part of, as MuJoCo has it.
-plain_mass = _T.matrix("ndof", "ndof")
-"""M, (ndof, ndof)."""
-drag = _T.matrix("ndof", "ndof")
-"""(M_h - M) / h, (ndof, ndof)."""
+plain_mass = _T.matrices(1, "ndof", "ndof")
+"""M, (ndof^2,)."""
+drag = _T.matrices(1, "ndof", "ndof")
+"""(M_h - M) / h, (ndof^2,)."""
 velocity = _T.vector("ndof")
 """qvel, (ndof,)."""
 smooth_force = _T.vector("ndof")

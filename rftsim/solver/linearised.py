@@ -39,8 +39,8 @@ def _is_zero(g):
 @fast
 def _add_derivative(p, b, g, a):
     """Add -h J' G J to a matrix, G the derivative of body b's wrench by its twist."""
-    path, n, ndof = equation.path(p, b), equation.path_length(p)[b], a.shape[0]
-    out, width, power = doubles(a.ctypes.data, a.size), lanes.padded(n), equation.power(p)
+    path, n, ndof = equation.path(p, b), equation.path_length(p)[b], equation.head(p).ndof
+    width, power = lanes.padded(n), equation.power(p)
     twists = doubles(equation.twists(p).ctypes.data, WRENCH * width)
     wrenches = doubles(equation.wrenches(p).ctypes.data, WRENCH * width)
     _turn(p, b, n, width, twists)
@@ -51,7 +51,7 @@ def _add_derivative(p, b, g, a):
         row = ndof * peek(path, i)
         for k in range(n):
             at = row + peek(path, k)
-            poke(out, at, peek(out, at) + peek(power, k))
+            poke(a, at, peek(a, at) + peek(power, k))
 
 
 @fast
@@ -97,7 +97,7 @@ def _factor(p, x, force):
         matrices.copy(p, equation.plain_mass(p), a)
         share, h = equation.late_share(p), equation.numbers(p).h
         for k in range(share.size):
-            share[k] = 1.0 / (1.0 + h * max(equation.drag(p)[k, k], 0.0) * equation.lightness(p)[k])
+            share[k] = 1.0 / (1.0 + h * max(equation.drag(p)[(share.size + 1) * k], 0.0) * equation.lightness(p)[k])
         matrices.add_difference(p, linear, equation.mass(p), share, a)
         constraint_rows.add_stiffness(p, x, force, a)
     matrices.factor(p, a)
