@@ -148,6 +148,6 @@ def fill_rows(model, data, contact, m, d, i, island, p):
             _join_cone(p, at, last)
         for row in range(at, last):
             path, length = equation.row_path(p, row), equation.row_length(p)[row]
-            for k in range(length - 1 if not pattern.is_small(p) else 0, 0, -1):
+            for k in range(length - 1, 0, -1):
                 pattern.couple(p, path[k], path[k - 1])
         at = last

@@ -93,12 +93,14 @@ def _compute_drives(model, data, m, d, t, i):
 
 
 @inline
-def _fill_parents(t, i, island, p):
-    """Fill what the tree couples each degree of freedom of an island to; constraints may couple more."""
-    place, dofs, first, parent = islands.place_of(i), islands.dofs(i), islands.dof_start(i)[island], equation.parent(p)
-    for k in range(parent.size):
-        above = t.dof_parent[dofs[first + k]] if k < islands.dof_count(i)[island] else pattern.NONE
-        parent[k] = place[above] if above >= 0 else pattern.NONE
+def _couple_trees(t, i, island, p):
+    """Couple what the trees of an island couple; constraints may couple more."""
+    place, dofs, first = islands.place_of(i), islands.dofs(i), islands.dof_start(i)[island]
+    pattern.begin(p)
+    for k in range(islands.dof_count(i)[island]):
+        above = t.dof_parent[dofs[first + k]]
+        if above >= 0:
+            pattern.couple(p, k, place[above])
 
 
 @inline
@@ -235,7 +237,7 @@ def _solve(model, data, contact, m, d, t, address, sand, old, new, i, island):
     numbers.tolerance, numbers.iterations = bed.tolerance, bed.iterations
     numbers.drift = numbers.parts = 0.0
     numbers.timestep, numbers.started = doubles(m + model.opt_timestep, 1)[0], state.started(old)[0]
-    _fill_parents(t, i, island, p)
+    _couple_trees(t, i, island, p)
     _fill_bodies(model, m, t, address, old, i, island, p)
     constraints.fill_rows(model, data, contact, m, d, i, island, p)
     _fill_dofs(model, data, m, d, old, i, island, p)

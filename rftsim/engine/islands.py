@@ -20,33 +20,33 @@ NONE: Final = -1
 _T: Final = Table(COUNTS, COUNTS.names or ())
 head = _T.head
 """Record COUNTS of the table at i."""
-leader = _T.vector("ntree", int64s)
+leader = _T.vector("ntree", view=int64s)
 """A tree of the same island, and at last the one that the island goes by, int64, (ntree,)."""
-island_of_row = _T.vector("nrow", int64s)
+island_of_row = _T.vector("nrow", view=int64s)
 """A tree that a row moves, or NONE, and at last its island, int64, (nrow,)."""
-island_of_body = _T.vector("nbody", int64s)
+island_of_body = _T.vector("nbody", view=int64s)
 """The same of a near body, int64, (nbody,)."""
-near = _T.vector("nbody", int64s)
+near = _T.vector("nbody", view=int64s)
 """Places of the near bodies among those of the bed, int64, (nbody,)."""
-dofs = _T.vector("nv", int64s)
+dofs = _T.vector("nv", view=int64s)
 """All degrees of freedom, island by island, int64, (nv,)."""
-place_of = _T.vector("nv", int64s)
+place_of = _T.vector("nv", view=int64s)
 """Place of a degree of freedom among those of its island, int64, (nv,)."""
-members = _T.vector("nbody", int64s)
+members = _T.vector("nbody", view=int64s)
 """All near bodies, by their place in `near`, island by island, int64, (nbody,)."""
-rows = _T.vector("nrow", int64s)
+rows = _T.vector("nrow", view=int64s)
 """All rows, island by island, int64, (nrow,)."""
-dof_start = _T.vector("ntree", int64s)
+dof_start = _T.vector("ntree", view=int64s)
 """Place of an island's first degree of freedom in `dofs`, int64, (ntree,)."""
-body_start = _T.vector("ntree", int64s)
+body_start = _T.vector("ntree", view=int64s)
 """Place of its first body in `members`."""
-row_start = _T.vector("ntree", int64s)
+row_start = _T.vector("ntree", view=int64s)
 """Place of its first row in `rows`."""
-dof_count = _T.vector("ntree", int64s)
+dof_count = _T.vector("ntree", view=int64s)
 """Degrees of freedom of an island, int64, (ntree,)."""
-body_count = _T.vector("ntree", int64s)
+body_count = _T.vector("ntree", view=int64s)
 """Near bodies of it."""
-row_count = _T.vector("ntree", int64s)
+row_count = _T.vector("ntree", view=int64s)
 """Rows of it."""
 smooth_force = _T.vector("nv")
 """The smooth generalised force but the sand's, of all degrees of freedom, (nv,)."""

@@ -37,13 +37,13 @@ class Table:
         """Numbers of the table itself, int64."""
         return len(self._names) + len(self._sizes)
 
-    def vector(self, size: Size, view: Any = doubles) -> Any:
-        """Declare an array of one axis, and make what gives it from p."""
-        entry, n = self._declare(size), self._number(size)
+    def vector(self, size: Size, times: Size = 1, view: Any = doubles) -> Any:
+        """Declare an array of one axis, whose size may be a product, and make what gives it from p."""
+        entry, n, m = self._declare(size, times), self._number(size), self._number(times)
 
         @exact
         def get(p):
-            return view(_address(p, entry), n(p))
+            return view(_address(p, entry), n(p) * m(p))
 
         return get
 
@@ -84,16 +84,6 @@ class Table:
             return doubles(_address(p, entry), m(p) * rows * n(p))
 
         return vector if columns is None else one, flat
-
-    def matrices(self, count: int, rows: Size, columns: Size) -> Any:
-        """Declare so many matrices, one behind another, and make what gives all their numbers from p, flat."""
-        entry, m, n = self._declare(count, rows, columns), self._number(rows), self._number(columns)
-
-        @exact
-        def get(p):
-            return doubles(_address(p, entry), count * m(p) * n(p))
-
-        return get
 
     def record(self, dtype: "np.dtype[Any]") -> Any:
         """Declare a record of float64, and make what gives it from p."""

@@ -91,7 +91,7 @@ numbers = _T.record(NUMBERS)
 # Of the bodies in the sand.
 path = _T.vectors("ndof", "nbody", view=int64s)
 """The degrees of freedom that move a body, rising, int64, of which `path_length` count."""
-path_length = _T.vector("nbody", int64s)
+path_length = _T.vector("nbody", view=int64s)
 """Number of them, int64, (nbody,)."""
 _motions = _T.vectors(WRENCH, "nbody", "ndof")
 rotation, _ = _T.each("nbody", 9)
@@ -102,7 +102,7 @@ _, first_frames = _T.each("nbody", step_frame.STEP_FRAME_NUMBERS)
 """The same at the start of the step, of all bodies."""
 length = _T.vector("nbody")
 """Length that makes a velocity of an angular one [m], (nbody,)."""
-surface = _T.vector("nbody", int64s)
+surface = _T.vector("nbody", view=int64s)
 """Address of each packed surface, int64, (nbody,)."""
 _kept = _T.vectors(KEPT_NUMBERS, "nbody")
 is_fresh = _T.vector("nbody")
@@ -116,7 +116,7 @@ misfit = _T.vector("nbody")
 row_path = _T.vectors("ndof", "nrow", view=int64s)
 """The degrees of freedom that a row depends on, rising, int64, of which `row_length` count; the same for all rows of
 an elliptic contact."""
-row_length = _T.vector("nrow", int64s)
+row_length = _T.vector("nrow", view=int64s)
 """Number of them, int64, (nrow,)."""
 row_jacobian = _T.vectors("ndof", "nrow")
 """J of a row by these."""
@@ -128,7 +128,7 @@ first_stiffness = _T.vector("nrow")
 """D as MuJoCo has it, (nrow,)."""
 first_reference = _T.vector("nrow")
 """aref at the start of the step, (nrow,)."""
-row_kind = _T.vector("nrow", int64s)
+row_kind = _T.vector("nrow", view=int64s)
 """One of KIND, int64, (nrow,)."""
 row_bound = _T.vector("nrow")
 """Largest force of a friction row; of a cone its mu, of its tangents their friction, (nrow,)."""
@@ -136,7 +136,7 @@ row_damping = _T.vector("nrow")
 """Derivative of -aref by the row's velocity [1/s], (nrow,)."""
 row_spring = _T.vector("nrow")
 """Derivative of -aref by the row's position [1/s^2], (nrow,)."""
-row_zone = _T.vector("nrow", int64s)
+row_zone = _T.vector("nrow", view=int64s)
 """Scratch: whether a row acts, see `constraint_rows`, int64, (nrow,)."""
 row_error = _T.vector("nrow")
 """J a - aref at the last solution of the linearised equation, (nrow,)."""
@@ -148,38 +148,22 @@ row_tried = _T.vector("nrow")
 """Scratch: J a - aref on the way along a direction, (nrow,)."""
 
 # The equation. Its matrices are of the pattern that `pattern` makes.
-parent = _T.vector("ndof", int64s)
-"""The last degree of freedom before one that a large matrix couples it to, or -1, int64, (ndof,); see `pattern`."""
-ancestors = _T.vectors("ndof", "ndof", view=int64s)
-"""All before one that it is coupled to, rising, int64, of which `ancestor_count` count."""
-ancestor_count = _T.vector("ndof", int64s)
-"""Number of them, int64, (ndof,)."""
-columns = _T.vectors("ndof", "ndof", view=int64s)
-"""The first columns of the blocks that hold these and the diagonal, rising, int64, of which `column_count` count."""
-first_in = _T.vectors("ndof", "ndof", view=int64s)
-"""Which of the ancestors is the first in such a block, int64."""
-column_count = _T.vector("ndof", int64s)
-"""Number of these blocks, int64, (ndof,)."""
-blocks = _T.vectors("ndof", "ndof", view=int64s)
-"""The first columns of all blocks that LANES rows from one on have, rising, int64, of which `block_count` count."""
-block_count = _T.vector("ndof", int64s)
-"""Number of them, int64, (ndof,)."""
-is_block = _T.vectors("ndof", "ndof", view=int64s)
-"""Scratch: whether there is one from a row and a column on, int64."""
-pivots = _T.vector("ndof")
-"""Scratch: inverse pivots of a matrix that is being factored, (ndof,)."""
-shares = _T.vector("ndof")
-"""Scratch: what a row of its inverse takes of those before, (ndof,)."""
-others_shares = _T.vector("ndof")
-"""Scratch: the same of the other triangle's, (ndof,)."""
+parent = _T.vector("ndof", view=int64s)
+"""The last tile before one that is coupled to it, or -1, int64, of which one for each LANES rows count."""
+tiles = _T.vectors("ndof", "ndof", view=int64s)
+"""The first columns of the tiles that the k-th row of them has, rising, int64, of which `tile_count` count."""
+tile_count = _T.vector("ndof", view=int64s)
+"""Number of them, int64."""
+before = _T.vector("ndof", view=int64s)
+"""Number of those before the diagonal, int64."""
 between = _T.vector("ndof")
 """Scratch: what the first factor's inverse makes of an impulse, (ndof,)."""
-mass = _T.matrices(1, "ndof", "ndof")
+mass = _T.vector("ndof", "ndof")
 """M_h: the mass matrix with what the integrator takes implicitly, (ndof^2,)."""
-mass_factors = _T.matrices(2, "ndof", "ndof")
-"""Factors of `mass`, (2 ndof^2,)."""
-plain_factors = _T.matrices(2, "ndof", "ndof")
-"""Factors of `plain_mass` where there are rows and drag, (2 ndof^2,)."""
+mass_factors = _T.vector("ndof", "ndof")
+"""Factors of `mass`, (ndof^2,)."""
+plain_factors = _T.vector("ndof", "ndof")
+"""Factors of `plain_mass` where there are rows and drag, (ndof^2,)."""
 lightness = _T.vector("ndof")
 """About the diagonal of M^-1, (ndof,)."""
 start = _T.vector("ndof")
@@ -205,10 +189,10 @@ scores = _T.records(SCORES, _POINTS)
 _wrenches_of = _T.vectors(WRENCH, _POINTS, "nbody", 2)
 end = _T.vector("ndof")
 """Generalised velocity at the end of the step, (ndof,)."""
-linear = _T.matrices(1, "ndof", "ndof")
+linear = _T.vector("ndof", "ndof")
 """Scratch: M - h J' G J, G the sand's derivatives, (ndof^2,)."""
-linear_factors = _T.matrices(2, "ndof", "ndof")
-"""Scratch: factors of the same with the rows' stiffness, (2 ndof^2,)."""
+linear_factors = _T.vector("ndof", "ndof")
+"""Scratch: factors of the same with the rows' stiffness, (ndof^2,)."""
 twists = _T.matrix(WRENCH, "ndof")
 """Scratch: -h times the twists of a body by the degrees of freedom of its path, row by row of a width, (6, ndof)."""
 wrenches = _T.matrix(WRENCH, "ndof")
@@ -251,9 +235,9 @@ filtered = _T.vector("ndof")
 """Scratch: the velocity change by that impulse, (ndof,)."""
 
 # The step that the equation is part of, as MuJoCo has it.
-plain_mass = _T.matrices(1, "ndof", "ndof")
+plain_mass = _T.vector("ndof", "ndof")
 """M, (ndof^2,)."""
-drag = _T.matrices(1, "ndof", "ndof")
+drag = _T.vector("ndof", "ndof")
 """(M_h - M) / h, (ndof^2,)."""
 velocity = _T.vector("ndof")
 """qvel, (ndof,)."""
