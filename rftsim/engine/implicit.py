@@ -12,7 +12,6 @@ from rftsim.engine.layout import CONSTANTS
 from rftsim.engine.refusals import WHY
 from rftsim.law import exports
 from rftsim.law.body import bed_of, header_at
-from rftsim.machine import lanes
 from rftsim.machine.compiling import inline
 from rftsim.machine.memory import doubles, int32s, pointer, release, stack_doubles, take
 from rftsim.solver import equation, linear_algebra, matrices, pattern, state, time_step
@@ -97,10 +96,10 @@ def _couple_trees(t, i, island, p):
     """Couple what the trees of an island couple; constraints may couple more."""
     place, dofs, first = islands.place_of(i), islands.dofs(i), islands.dof_start(i)[island]
     pattern.begin(p)
-    for k in range(islands.dof_count(i)[island]):
-        above = t.dof_parent[dofs[first + k]]
+    for k in range(first, first + islands.dof_count(i)[island]):
+        above = t.dof_parent[dofs[k]]
         if above >= 0:
-            pattern.couple(p, k, place[above])
+            pattern.couple(p, place[dofs[k]], place[above])
 
 
 @inline
@@ -143,13 +142,13 @@ def _fill_mass(model, data, m, d, i, island, p):
     column, value = int32s(pointer(m + model.M_colind), total), doubles(pointer(d + data.M), total)
     out, n = equation.plain_mass(p), equation.head(p).ndof
     matrices.clear(p, out)
-    for k in range(islands.dof_count(i)[island]):
-        dof = dofs[first + k]
+    for k in range(n):
+        out[(n + 1) * k] = 1.0
+    for k in range(first, first + islands.dof_count(i)[island]):
+        dof, at = dofs[k], place[dofs[k]]
         for entry in range(start[dof], start[dof] + number[dof]):
             other = place[column[entry]]
-            out[n * k + other] = out[n * other + k] = value[entry]
-    for k in range(islands.dof_count(i)[island], n):
-        out[(n + 1) * k] = 1.0
+            out[n * at + other] = out[n * other + at] = value[entry]
 
 
 @inline
@@ -162,22 +161,22 @@ def _fill_drag(model, data, m, d, i, island, p):
     if integrator == _EULER:
         if int32s(m + model.opt_disableflags, 1)[0] & _UNDAMPED == 0:
             damping = doubles(pointer(m + model.dof_damping), nv)
-            for k in range(islands.dof_count(i)[island]):
-                out[(n + 1) * k] = damping[dofs[first + k]]
-                numbers.dragged = 1.0 if damping[dofs[first + k]] != 0.0 else numbers.dragged
+            for k in range(first, first + islands.dof_count(i)[island]):
+                out[(n + 1) * place[dofs[k]]] = damping[dofs[k]]
+                numbers.dragged = 1.0 if damping[dofs[k]] != 0.0 else numbers.dragged
         return
     number, start = int32s(pointer(m + model.D_rownnz), nv), int32s(pointer(m + model.D_rowadr), nv)
     total = start[nv - 1] + number[nv - 1]
     column, value = int32s(pointer(m + model.D_colind), total), doubles(pointer(d + data.qDeriv), total)
-    for k in range(islands.dof_count(i)[island]):
-        dof = dofs[first + k]
+    for k in range(first, first + islands.dof_count(i)[island]):
+        dof, at = dofs[k], place[dofs[k]]
         for entry in range(start[dof], start[dof] + number[dof]):
             j = column[entry]
             numbers.dragged = 1.0 if value[entry] != 0.0 else numbers.dragged
             if integrator == _IMPLICIT or j == dof:
-                out[n * k + place[j]] = -value[entry]
+                out[n * at + place[j]] = -value[entry]
             elif j < dof:  # implicitfast takes the lower triangle for both
-                out[n * k + place[j]] = out[n * place[j] + k] = -value[entry]
+                out[n * at + place[j]] = out[n * place[j] + at] = -value[entry]
 
 
 @inline
@@ -186,14 +185,13 @@ def _fill_dofs(model, data, m, d, old, i, island, p):
     nv, dofs, first = islands.head(i).nv, islands.dofs(i), islands.dof_start(i)[island]
     velocity, lacking = doubles(pointer(d + data.qvel), nv), state.lacking(old, nv)
     light, smooth = doubles(pointer(m + model.dof_invweight0), nv), islands.smooth_force(i)
-    count = islands.dof_count(i)[island]
-    for k in range(count):
-        dof = dofs[first + k]
-        equation.velocity(p)[k], equation.lacking(p)[k] = velocity[dof], lacking[dof]
-        equation.lightness(p)[k], equation.smooth_force(p)[k] = light[dof], smooth[dof]
-    for k in range(count, equation.head(p).ndof):
-        equation.velocity(p)[k] = equation.lacking(p)[k] = equation.smooth_force(p)[k] = 0.0
-        equation.lightness(p)[k] = 1.0
+    for at in range(equation.head(p).ndof):
+        equation.velocity(p)[at] = equation.lacking(p)[at] = equation.smooth_force(p)[at] = 0.0
+        equation.lightness(p)[at] = 1.0
+    for k in range(first, first + islands.dof_count(i)[island]):
+        dof, at = dofs[k], islands.place_of(i)[dofs[k]]
+        equation.velocity(p)[at], equation.lacking(p)[at] = velocity[dof], lacking[dof]
+        equation.lightness(p)[at], equation.smooth_force(p)[at] = light[dof], smooth[dof]
     pattern.find(p)
     _fill_mass(model, data, m, d, i, island, p)
     _fill_drag(model, data, m, d, i, island, p)
@@ -207,10 +205,10 @@ def _hand_over(model, data, m, d, address, new, i, island, p):
     """Add an island's force to MuJoCo's passive ones, and keep what must last."""
     nv, dofs, first = islands.head(i).nv, islands.dofs(i), islands.dof_start(i)[island]
     force, lacking, after = doubles(pointer(d + data.qfrc_passive), nv), state.lacking(new, nv), state.after(new, nv)
-    for k in range(islands.dof_count(i)[island]):
-        dof = dofs[first + k]
-        force[dof] += equation.out(p)[k]
-        lacking[dof], after[dof] = equation.lacking(p)[k], equation.after(p)[k]
+    for k in range(first, first + islands.dof_count(i)[island]):
+        dof, at = dofs[k], islands.place_of(i)[dofs[k]]
+        force[dof] += equation.out(p)[at]
+        lacking[dof], after[dof] = equation.lacking(p)[at], equation.after(p)[at]
     first = islands.body_start(i)[island]
     for b in range(equation.head(p).nbody):
         k = islands.near(i)[islands.members(i)[first + b]]
@@ -226,8 +224,8 @@ def _solve(model, data, contact, m, d, t, address, sand, old, new, i, island):
     """Solve for the sand's force on one island; whether there was memory to do so."""
     p, work = stack_doubles(TABLE), doubles(stack_doubles(_WORK), _WORK)
     linear_algebra.clear(work)
-    counts = islands.body_count(i)[island], islands.dof_count(i)[island], islands.row_count(i)[island]
-    memory = take(equation.lay_out(p, counts[0], lanes.padded(counts[1]), counts[2]))
+    counts = islands.body_count(i)[island], islands.place(i, island, t.dof_parent), islands.row_count(i)[island]
+    memory = take(equation.lay_out(p, counts[0], counts[1], counts[2]))
     if memory == 0:
         return False
     equation.place(p, memory)

@@ -8,6 +8,7 @@ from typing import Final
 
 import numpy as np
 
+from rftsim.machine import lanes
 from rftsim.machine.compiling import exact
 from rftsim.machine.memory import int64s
 from rftsim.machine.table import Table
@@ -31,7 +32,9 @@ near = _T.vector("nbody", view=int64s)
 dofs = _T.vector("nv", view=int64s)
 """All degrees of freedom, island by island, int64, (nv,)."""
 place_of = _T.vector("nv", view=int64s)
-"""Place of a degree of freedom among those of its island, int64, (nv,)."""
+"""Place of a degree of freedom in the equation of its island, see `place`, int64, (nv,)."""
+below = _T.vector("nv", view=int64s)
+"""Scratch: how many there are in the subtree of a degree of freedom, itself among them, int64, (nv,)."""
 members = _T.vector("nbody", view=int64s)
 """All near bodies, by their place in `near`, island by island, int64, (nbody,)."""
 rows = _T.vector("nrow", view=int64s)
@@ -133,5 +136,33 @@ def sort(i, tree_of_dof):
     _sort(places, dof_start(i), dof_count(i), order)
     _sort(island_of_body(i), body_start(i), body_count(i), members(i))
     _sort(island_of_row(i), row_start(i), row_count(i), rows(i))
-    for k in range(order.size):
-        places[order[k]] = k - dof_start(i)[places[order[k]]]
+
+
+@exact
+def place(i, island, parent):
+    """Place an island's degrees of freedom in its equation, so that no tile of its matrices couples what trees do not.
+
+    A branch that does not fit into what is left of a tile begins a new one, see `rftsim.solver.pattern`.
+
+    Args:
+        i: The table.
+        island: The island.
+        parent: The degree of freedom above each, or a negative number, (nv,).
+
+    Returns:
+        The room that they take, a multiple of LANES.
+    """
+    places, sizes, first = place_of(i), below(i), dof_start(i)[island]
+    own = dofs(i)[first : first + dof_count(i)[island]]
+    for k in range(own.size):
+        sizes[own[k]] = 1
+    for k in range(own.size - 1, 0, -1):
+        if parent[own[k]] >= 0:
+            sizes[parent[own[k]]] += sizes[own[k]]
+    room, before = 0, NONE
+    for k in range(own.size):
+        left = lanes.padded(room) - room
+        if parent[own[k]] != before and sizes[own[k]] > left:
+            room += left
+        places[own[k]], room, before = room, room + 1, own[k]
+    return lanes.padded(room)

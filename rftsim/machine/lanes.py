@@ -18,6 +18,7 @@ FUSED: Final = ("contract",)
 """How products are added: fused, where the processor can."""
 WORD: Final = ir.IntType(64)
 VECTOR: Final = ir.VectorType(ir.DoubleType(), LANES)
+"""Types of an index and of a vector."""
 
 
 @inline
@@ -27,10 +28,12 @@ def padded(size):
 
 
 def data_of(context: Any, builder: Any, signature: Any, arguments: Any, k: int) -> Any:
+    """The pointer to the numbers of an argument that is an array."""
     return context.make_array(signature.args[k])(context, builder, arguments[k]).data
 
 
 def place_of(builder: Any, data: Any, index: Any) -> Any:
+    """The pointer to the number at an index."""
     return builder.gep(data, [index])
 
 
@@ -41,6 +44,7 @@ def load(builder: Any, data: Any, index: Any, lanes: int = LANES) -> Any:
 
 
 def store(builder: Any, value: Any, data: Any, index: Any) -> None:
+    """Write a vector from an index on."""
     builder.store(value, builder.bitcast(place_of(builder, data, index), value.type.as_pointer()), align=8)
 
 
@@ -52,6 +56,7 @@ def spread(builder: Any, number: Any, lanes: int = LANES) -> Any:
 
 
 def shuffled(builder: Any, one: Any, other: Any, places: list[int]) -> Any:
+    """The numbers of two vectors at given places, counted through both."""
     return builder.shuffle_vector(one, other, ir.Constant(ir.VectorType(ir.IntType(32), len(places)), places))
 
 
@@ -64,11 +69,13 @@ def zero_sum(builder: Any, lanes: int = LANES) -> Any:
 
 
 def add_product(builder: Any, one: Any, other: Any, place: Any) -> None:
+    """Add the product of two vectors to what is at a place."""
     product = builder.fmul(one, other, flags=FUSED)
     builder.store(builder.fadd(builder.load(place), product, flags=FUSED), place)
 
 
 def number(k: int) -> Any:
+    """An index."""
     return ir.Constant(WORD, k)
 
 

@@ -18,8 +18,8 @@ from rftsim.machine.table import Table
 from rftsim.solver.state import KEPT_NUMBERS, kept_at
 
 TABLE_HEAD: Final = np.dtype([(name, "i8") for name in ("nbody", "ndof", "nrow", "sand", "work")])
-"""The head of a table: the counts, of which that of degrees of freedom is a multiple of LANES, see `lanes`, and those
-at its end are at rest for good, of mass one; then addresses, of the packed sand, and of the counters of WORK."""
+"""The head of a table: the counts, of which that of degrees of freedom is a multiple of LANES, and some of these stand
+for none: they rest, of mass one; then addresses, of the packed sand, and of the counters of WORK."""
 WORK: Final = np.dtype([("evaluations", "f8"), ("derivatives", "f8"), ("unsolved", "f8")])
 """The cost of solutions, counted up: evaluations of every body's force, of its derivative, and equations unsolved."""
 NUMBERS: Final = np.dtype(
