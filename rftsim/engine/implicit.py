@@ -13,7 +13,7 @@ from rftsim.engine.refusals import WHY
 from rftsim.law import exports
 from rftsim.law.body import bed_of, header_at
 from rftsim.machine.compiling import inline
-from rftsim.machine.memory import doubles, int32s, pointer, release, stack_doubles, take
+from rftsim.machine.memory import doubles, int32s, peek, pointer, poke, release, stack_doubles, take
 from rftsim.solver import equation, linear_algebra, matrices, pattern, state, time_step
 from rftsim.solver.equation import TABLE, WORK
 from rftsim.solver.motion import size_of
@@ -147,8 +147,9 @@ def _fill_mass(model, data, m, d, i, island, p):
     for k in range(first, first + islands.dof_count(i)[island]):
         dof, at = dofs[k], place[dofs[k]]
         for entry in range(start[dof], start[dof] + number[dof]):
-            other = place[column[entry]]
-            out[n * at + other] = out[n * other + at] = value[entry]
+            other, number_there = peek(place, peek(column, entry)), peek(value, entry)
+            poke(out, n * at + other, number_there)
+            poke(out, n * other + at, number_there)
 
 
 @inline
@@ -171,12 +172,13 @@ def _fill_drag(model, data, m, d, i, island, p):
     for k in range(first, first + islands.dof_count(i)[island]):
         dof, at = dofs[k], place[dofs[k]]
         for entry in range(start[dof], start[dof] + number[dof]):
-            j = column[entry]
-            numbers.dragged = 1.0 if value[entry] != 0.0 else numbers.dragged
+            j, drag = peek(column, entry), -peek(value, entry)
+            numbers.dragged = 1.0 if drag != 0.0 else numbers.dragged
             if integrator == _IMPLICIT or j == dof:
-                out[n * at + place[j]] = -value[entry]
+                poke(out, n * at + peek(place, j), drag)
             elif j < dof:  # implicitfast takes the lower triangle for both
-                out[n * at + place[j]] = out[n * place[j] + at] = -value[entry]
+                poke(out, n * at + peek(place, j), drag)
+                poke(out, n * peek(place, j) + at, drag)
 
 
 @inline

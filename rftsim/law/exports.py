@@ -15,10 +15,10 @@ from rftsim.law import step_frame, sums
 from rftsim.law.body import bed_of, body_at, frame_over, header_at, medium_of
 from rftsim.law.field import is_relief
 from rftsim.law.frame import sunk
-from rftsim.law.free_surface import after, lowest_depth
+from rftsim.law.free_surface import lowest_depth
 from rftsim.law.grounds import GROUNDS, Ground
 from rftsim.law.laws import RESPONSES, Response
-from rftsim.law.layout import PRESSED
+from rftsim.law.layout import PRESSED, WRENCH
 from rftsim.law.leading import SHARP, Edge
 from rftsim.law.vectors import to_world
 from rftsim.law.wheel_drop import dropped
@@ -26,6 +26,8 @@ from rftsim.machine.compiling import inline
 from rftsim.machine.exports import address, entry
 from rftsim.machine.memory import doubles, matrix, stack_doubles
 
+AHEAD: Final = 2 * WRENCH + 1
+"""Numbers that `ahead` fills."""
 RAMP: Final = 100.0
 """Steepness of the leading-edge rule in the implicit force: faces fall out between n.v_hat = 0 and -1/RAMP."""
 
@@ -52,7 +54,7 @@ def by_kind(make: Callable[[Response, Ground], Any]) -> Any:
 
 
 _drop, _sums, _tractions = by_kind(dropped), by_kind(sums.sums), by_kind(sums.tractions)
-_pressures, _deepest = by_kind(sums.pressures), by_kind(sums.deepest)
+_pressures = by_kind(sums.pressures)
 _ahead, _derivative = by_kind(sums.sums_ahead), by_kind(derivatives.derivative)
 _ANSWERS: Final = len(RESPONSES)
 
@@ -169,33 +171,25 @@ def _raised(surface, frame, margin):
     return sunk(frame, frame.rise, frame.height + 2.0 * margin, frame.moved)
 
 
-@entry(types.float64, *[address] * 5, types.float64)
-def deepest(sand, surface, frame, xmat, twist, h):
-    """Largest depth of the triangles of a body that moves with a twist, now or after a time h [m]."""
-    body, kind, found = body_at(surface), _kind(sand), -1e30
-    moving = step_frame.moving(frame, doubles(xmat, 9), doubles(twist, 6))
-    for _ in range(2):
-        found = max(found, _deepest(kind, (body, _raised(surface, moving, 0.0), sand)))
-        moving = after(moving, h)
-    return found
-
-
 @entry(types.void, *[address] * 5, types.float64, types.float64, address)
 def ahead(sand, surface, frame, xmat, twist, v_c, h, out):
-    """Wrench continuous at rest, world frame: at the present depths, and at those after a time h, (12,)."""
-    body, rotation = body_at(surface), doubles(xmat, 9)
+    """Wrench continuous at rest, world frame: at the present depths, and at those after a time h; mean depth [m].
+
+    That is of the triangles which the sand acts on, now or then, each by its own depth; `out` is (AHEAD,).
+    """
+    body, rotation, found = body_at(surface), doubles(xmat, 9), doubles(out, AHEAD)
     moving = step_frame.moving(frame, rotation, doubles(twist, 6))
     margin = _farthest(surface, moving.v0, moving.omega, h)
     moving = _raised(surface, moving, margin)
     if deepest_corner(surface, moving) + margin <= 0.0:
-        total = doubles(out, 12)
-        for k in range(12):
-            total[k] = 0.0
+        for k in range(AHEAD):
+            found[k] = 0.0
         return
     medium, edge = medium_of(sand), _edge(surface, RAMP)
-    now, after = _ahead(_kind(sand), (body, moving, sand, medium, edge, v_c, h, margin))
-    _to_world(rotation, now, doubles(out, 6))
-    _to_world(rotation, after, doubles(out + 48, 6))
+    now, then, depth = _ahead(_kind(sand), (body, moving, sand, medium, edge, v_c, h, margin))
+    _to_world(rotation, now, found[:6])
+    _to_world(rotation, then, found[6:])
+    found[AHEAD - 1] = depth
 
 
 @entry(types.void, *[address] * 5, types.float64, types.float64, address)

@@ -15,7 +15,7 @@ from rftsim.law.grounds import Ground
 from rftsim.law.laws import Response
 from rftsim.law.layout import PRESSED
 from rftsim.law.leading import reach2
-from rftsim.law.selection import CAPACITY, LOOK, area, centre, choosing, chosen_on_stack, filled_up, next_run, normal
+from rftsim.law.selection import CAPACITY, LOOK, area, centre, choosing, chosen_on_stack, filled_up, normal
 from rftsim.law.stress import TINY
 from rftsim.law.vectors import larger
 from rftsim.machine.compiling import inline, inline_loop, merged
@@ -58,24 +58,6 @@ def _force(stress, weight, held):
     return weight * sx + held * mx, weight * sy + held * my, weight * sz + held * mz
 
 
-def deepest(response: Response, ground: Ground) -> Any:
-    """Make the largest depth of a body's triangles [m]; any negative number where none is in the sand."""
-
-    @inline_loop
-    def found(body, frame, sand):
-        field, most, last = ground.field(sand), -1e30, 0
-        while last < body.count:
-            first, last = next_run(body, last, frame, 0.0)
-            for i in range(first, last):
-                x, y, z = bodies.centre(body, i)
-                most = larger(
-                    most, ground.look(x, y, z, bodies.normal(body, i), frame, field)[0] - drop(x, y, z, frame)
-                )
-        return most
-
-    return found
-
-
 def sums(response: Response, ground: Ground) -> Any:
     """Make the sum of force and moment over a packed body, at the velocity of the moment."""
     choose, stress, felt_depth = choosing(response, ahead=False), response.stress, response.felt_depth
@@ -109,7 +91,7 @@ def sums(response: Response, ground: Ground) -> Any:
 
 
 def sums_ahead(response: Response, ground: Ground) -> Any:
-    """Make the sums of a law made continuous at rest, now and at the depths after a time h of this motion.
+    """Make the sums of a law made continuous at rest, now and at the depths after a time h, and the mean depth.
 
     The resistance is scaled by |v| / sqrt(|v|^2 + v_c^2): the force of a law that knows only the direction of motion
     falls to zero at rest.
@@ -117,7 +99,8 @@ def sums_ahead(response: Response, ground: Ground) -> Any:
     choose, stress, felt_depth = choosing(response, ahead=True), response.stress, response.felt_depth
 
     @inline_loop
-    def add(chosen, n, frame, medium, edge, v_c, h, now, after):
+    def add(chosen, n, frame, medium, edge, v_c, h, now, after, volumes):
+        volume, moment = volumes
         for i in range(n):
             (x, y, z), n_hat, a = centre(chosen, i), normal(chosen, i), area(chosen, i)
             v = point_velocity(frame, x, y, z)
@@ -127,25 +110,30 @@ def sums_ahead(response: Response, ground: Ground) -> Any:
             deep -= drop(x, y, z, frame)
             s = stress(n_hat, v, up, ground.local(frame, up), medium, edge)
             later = deep - h * rising(v, rise)
+            lowest = larger(larger(deep, later), 0.0)
+            volume, moment = volume + a * lowest, moment + a * lowest * lowest
             held = a * s.inertia if deep > 0.0 else 0.0
             now = _added(now, _force(s, slow * a * larger(felt_depth(deep, medium), 0.0), held), x, y, z)
             held = a * s.inertia if later > 0.0 else 0.0
             after = _added(after, _force(s, slow * a * larger(felt_depth(later, medium), 0.0), held), x, y, z)
-        return now, after
+        return now, after, (volume, moment)
 
     @inline_loop
     def summed(body, frame, sand, medium, edge, v_c, h, margin):
-        """The wrench at the present depths, and that at the later ones; no triangle moves further than the margin."""
+        """The wrench at the present depths, that at the later ones, and the mean of the triangles' larger depths [m].
+
+        They count by themselves, as the force grows with the depth. No triangle moves further than the margin.
+        """
         chosen, n, reach, last, field = chosen_on_stack(), 0, reach2(edge), 0, ground.field(sand)
-        now, after = _nothing(), _nothing()
+        now, after, volumes = _nothing(), _nothing(), (0.0, 0.0)
         while last < body.count:
             n, last = choose(body, last, frame, margin, reach, h, chosen, n)
             if n > CAPACITY - LOOK or last >= body.count:
                 n = filled_up(chosen, n)
                 ground.settle(chosen, CAPACITY, n, frame, field)
-                now, after = add(chosen, n, frame, medium, edge, v_c, h, now, after)
+                now, after, volumes = add(chosen, n, frame, medium, edge, v_c, h, now, after, volumes)
                 n = 0
-        return now, after
+        return now, after, volumes[1] / (volumes[0] + TINY)
 
     return summed
 

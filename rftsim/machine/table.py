@@ -3,16 +3,14 @@
 What works on a table takes its address p alone: it can so be compiled once, and called apart, whatever it works on.
 """
 
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
 from rftsim.machine.compiling import exact, inline
-from rftsim.machine.memory import doubles, int64s, matrix, stack_doubles
+from rftsim.machine.memory import doubles, int64s, matrix, peek, poke, stack_doubles
 from rftsim.machine.records import record_at, record_behind, records_behind
 
-_POWERS: Final = 3
-"""Powers of a count that a size can hold, from zero on."""
 Size = int | str
 """A number, or the name of a count of the table."""
 
@@ -99,22 +97,21 @@ class Table:
 
     def layout(self) -> Any:
         """A compiled function that fills the table at p with distances from one place, and gives all arrays' bytes."""
-        sizes, outer, whole, counts = np.array(self._sizes), len(self._names), self.size, len(self._counts)
-        room = counts * _POWERS
+        outer, whole, counts = len(self._names), self.size, len(self._counts)
+        kinds, kind = np.unique([powers for _, *powers in self._sizes], axis=0, return_inverse=True)
+        room, bytes_each = len(kinds), np.array([8 * constant for constant, *_ in self._sizes])
 
         @exact
         def lay_out(p):
-            table, powers, at = int64s(p, whole), int64s(stack_doubles(room), room), 0
-            for count in range(counts):
-                powers[_POWERS * count] = 1
-                for power in range(1, _POWERS):
-                    powers[_POWERS * count + power] = powers[_POWERS * count + power - 1] * table[count]
-            for array in range(len(sizes)):
-                size = sizes[array, 0]
+            table, products, at = int64s(p, whole), int64s(stack_doubles(room), room), 0
+            for k in range(room):
+                products[k] = 1
                 for count in range(counts):
-                    size *= powers[_POWERS * count + sizes[array, count + 1]]
-                table[outer + array] = at
-                at += 8 * size
+                    for _ in range(kinds[k, count]):
+                        products[k] *= table[count]
+            for array in range(len(kind)):
+                poke(table, outer + array, at)
+                at += bytes_each[array] * peek(products, kind[array])
             return at
 
         return lay_out
@@ -133,7 +130,6 @@ class Table:
 
     def _declare(self, *shape: Size) -> int:
         """Make place for an array; where its address stands in the table."""
-        assert all(shape.count(name) < _POWERS for name in self._counts)
         constant = int(np.prod([size for size in shape if isinstance(size, int)], dtype=int))
         self._sizes.append([constant, *(shape.count(name) for name in self._counts)])
         return len(self._names) + len(self._sizes) - 1

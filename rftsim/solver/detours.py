@@ -140,7 +140,7 @@ def _softest(p):
 @exact
 def _linearise_apart(p, fall):
     """Take each body's force and its derivative at the present point, slowed down by `fall` where the sand holds it."""
-    numbers, v, out = equation.numbers(p), equation.velocity_of(p, POINT.now), equation.wrench_of(p, POINT.spare, 0, 0)
+    numbers, v, out = equation.numbers(p), equation.velocity_of(p, POINT.now), equation.answer_of(p, POINT.spare, 0)
     for b in range(equation.head(p).nbody):
         kept = equation.kept(p, b)
         felt_twist(p, b, v, kept.twist)

@@ -11,6 +11,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from rftsim.law import step_frame
+from rftsim.law.exports import AHEAD
 from rftsim.law.layout import WRENCH
 from rftsim.machine.compiling import exact, inline
 from rftsim.machine.memory import doubles, int64s, matrix
@@ -27,7 +28,7 @@ NUMBERS: Final = np.dtype(
         (name, "f8")
         for name in (
             *("timestep", "h", "started", "dragged", "tolerance", "iterations"),
-            *("scale", "v_c", "solved", "drift", "parts", "is_linearised", "is_factored"),
+            *("scale", "v_c", "solved", "drift", "parts", "is_linearised", "is_factored", "is_stiff"),
         )
     ]
 )
@@ -35,7 +36,7 @@ NUMBERS: Final = np.dtype(
 implicitly; tolerance and most iterations; size of the impulses but the sand's and the rows'; speed below which a
 triangle's stress falls to zero [m/s]; whether the equation was solved; length of the last part of a split step [s];
 parts that are needed; whether `linear` is that of the derivatives as they are, and `linear_factors` are its factors
-with the rows that act as noted."""
+with the rows that act as noted; whether `stiff_mass` has the stiffness of these."""
 SCORES: Final = np.dtype([("missing", "f8"), ("scale", "f8"), ("error", "f8")])
 """Scores of a tried velocity: size of the missing impulse, size of all impulses, and error of the bodies' speeds over
 what is allowed, were there no stiffness."""
@@ -186,7 +187,7 @@ errors_of = _T.vectors("nrow", _POINTS)
 """J a - aref of the rows there, (nrow,)."""
 scores = _T.records(SCORES, _POINTS)
 """Record SCORES of point k."""
-_wrenches_of = _T.vectors(WRENCH, _POINTS, "nbody", 2)
+_answers_of = _T.vectors(AHEAD, _POINTS, "nbody")
 end = _T.vector("ndof")
 """Generalised velocity at the end of the step, (ndof,)."""
 linear = _T.vector("ndof", "ndof")
@@ -199,6 +200,8 @@ wrenches = _T.matrix(WRENCH, "ndof")
 """Scratch: the wrenches that follow from these, likewise, (6, ndof)."""
 power = _T.vector("ndof")
 """Scratch: their power on one degree of freedom of the path, (ndof,)."""
+stiff_mass = _T.vector("ndof", "ndof")
+"""Scratch: M with the rows' stiffness, (ndof^2,)."""
 change = _T.vector("ndof")
 """Scratch: a velocity change v+ - v, or an impulse, (ndof,)."""
 seen = _T.vector("ndof")
@@ -308,13 +311,25 @@ def motion(p, b, k):
 @inline
 def wrench_of(p, k, b, later):
     """A body's wrench at point k: at the present depths (0) or those after the step (1), (6,)."""
-    return _wrenches_of(p, 2 * (head(p).nbody * k + b) + later)
+    return doubles(answer_of(p, k, b).ctypes.data + 8 * WRENCH * later, WRENCH)
 
 
 @inline
-def wrenches_of(p, k):
-    """All bodies' wrenches at point k, at both depths, (12 nbody,)."""
-    return doubles(wrench_of(p, k, 0, 0).ctypes.data, 2 * WRENCH * head(p).nbody)
+def answer_of(p, k, b):
+    """What the sand answers to a body's motion at point k, see `exports.ahead`, (AHEAD,)."""
+    return _answers_of(p, head(p).nbody * k + b)
+
+
+@inline
+def depth_of(p, k, b):
+    """The mean depth of a body's triangles that the sand acts on [m], now or after the step, (1,)."""
+    return doubles(answer_of(p, k, b).ctypes.data + 16 * WRENCH, 1)
+
+
+@inline
+def answers_of(p, k):
+    """All bodies' answers at point k, (AHEAD nbody,)."""
+    return doubles(answer_of(p, k, 0).ctypes.data, AHEAD * head(p).nbody)
 
 
 @exact

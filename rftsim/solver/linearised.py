@@ -84,22 +84,25 @@ def _linearise(p, which):
 
 
 @exact
-def _factor(p, x, force):
-    """Factor the matrix of the linearised equation, with the rows' stiffness at x.
+def _factor(p, x, force, is_changed):
+    """Factor the matrix of the linearised equation, with the rows' stiffness at x, and whether that is another.
 
     Where there are rows and drag, it is that for the velocity change that the rows see, M^-1 M_h (v+ - v); the sand's
     share is then approximate, by a diagonal of what leads back from that.
     """
-    a, linear = equation.linear_factors(p), equation.linear(p)
+    a, linear, stiff = equation.linear_factors(p), equation.linear(p), equation.stiff_mass(p)
     if equation.head(p).nrow == 0:
         matrices.copy(p, linear, a)
     else:
-        matrices.copy(p, equation.plain_mass(p), a)
+        if is_changed or equation.numbers(p).is_stiff == 0.0:
+            matrices.copy(p, equation.plain_mass(p), stiff)
+            constraint_rows.add_stiffness(p, x, force, stiff)
+            equation.numbers(p).is_stiff = 1.0
+        matrices.copy(p, stiff, a)
         share, h = equation.late_share(p), equation.numbers(p).h
         for k in range(share.size):
             share[k] = 1.0 / (1.0 + h * max(equation.drag(p)[(share.size + 1) * k], 0.0) * equation.lightness(p)[k])
         matrices.add_difference(p, linear, equation.mass(p), share, a)
-        constraint_rows.add_stiffness(p, x, force, a)
     matrices.factor(p, a)
     equation.numbers(p).is_factored = 1.0
 
@@ -134,7 +137,7 @@ def solution(p, v, errors, residual, which, out):
         return
     direction, nothing = equation.direction(p), equation.missing(p)
     if equation.numbers(p).is_factored == 0.0:
-        _factor(p, nothing, nothing)
+        _factor(p, nothing, nothing, False)
     matrices.substitute(p, equation.linear_factors(p), residual, direction)
     for k in range(v.size):
         out[k] = v[k] - direction[k]
@@ -164,8 +167,9 @@ def _solve_with_rows(p, v, errors, residual, which, out):
     direction, taken, numbers = equation.direction(p), equation.taken(p), equation.numbers(p)
     target = EXACTNESS[which] * (linear_algebra.dot(residual, residual) + TINY)
     for _ in range(ITERATIONS):
-        if constraint_rows.note_zones(p, x) or numbers.is_factored == 0.0:
-            _factor(p, x, force)
+        is_changed = constraint_rows.note_zones(p, x)
+        if is_changed or numbers.is_factored == 0.0:
+            _factor(p, x, force, is_changed)
         _fill_direction(p)
         matrices.multiply(p, equation.linear(p), taken, change)
         stiff, slope = linear_algebra.dot(direction, change), linear_algebra.dot(direction, fixed)

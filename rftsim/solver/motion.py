@@ -70,7 +70,7 @@ def generalised(p, k, later, out):
 
 @exact
 def respond(p, b, twist, out):
-    """Fill out with the wrenches on body b that moves with a twist, at the present depths and the later ones, (12,)."""
+    """Fill out with what the sand answers to a twist of body b, see `exports.ahead`, (AHEAD,)."""
     sand, numbers, f, r = equation.head(p).sand, equation.numbers(p), equation.frame(p, b), equation.rotation(p, b)
     fixed = equation.surface(p)[b], f.ctypes.data, r.ctypes.data
     exports.ahead(sand, *fixed, twist.ctypes.data, numbers.v_c, numbers.h, out.ctypes.data)
@@ -82,7 +82,7 @@ def evaluate(p, v, k):
     twist = doubles(stack_doubles(6), 6)
     for b in range(equation.head(p).nbody):
         felt_twist(p, b, v, twist)
-        respond(p, b, twist, equation.wrench_of(p, k, b, 0))
+        respond(p, b, twist, equation.answer_of(p, k, b))
     equation.work(p).evaluations += 1.0
 
 

@@ -83,10 +83,10 @@ def allowed(p, b, v):
 
 @exact
 def copy_point(p, origin, target):
-    """Copy a point: its velocity, residual, errors of rows, wrenches and scores."""
+    """Copy a point: its velocity, residual, errors of rows, the sand's answers and scores."""
     linear_algebra.copy(equation.velocity_of(p, origin), equation.velocity_of(p, target))
     linear_algebra.copy(equation.residual_of(p, origin), equation.residual_of(p, target))
     linear_algebra.copy(equation.errors_of(p, origin), equation.errors_of(p, target))
-    linear_algebra.copy(equation.wrenches_of(p, origin), equation.wrenches_of(p, target))
+    linear_algebra.copy(equation.answers_of(p, origin), equation.answers_of(p, target))
     known, copied = equation.scores(p, origin), equation.scores(p, target)
     copied.missing, copied.scale, copied.error = known.missing, known.scale, known.error

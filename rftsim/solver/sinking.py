@@ -1,10 +1,10 @@
-"""Depths within a step: whether a body can reach the sand, how deep it comes, and how deep it is after a part."""
+"""Depths within a step: whether a body can reach the sand, and how deep it is after a part."""
 
 from typing import Final
 
 import numpy as np
 
-from rftsim.law import exports, step_frame
+from rftsim.law import step_frame
 from rftsim.law.body import frame_over, header_at
 from rftsim.law.free_surface import after, lowest_depth
 from rftsim.law.vectors import dot
@@ -32,14 +32,3 @@ def sink(p, v, h):
     for b in range(equation.head(p).nbody):
         twist_of(p, b, v, twist)
         step_frame.keep(after(frame_at(p, b, twist), h), equation.frame(p, b).ctypes.data)
-
-
-@exact
-def deepest(p, b, v, h):
-    """Largest depth of a body's triangles, now or after a time h of the motion v [m]."""
-    twist = doubles(stack_doubles(6), 6)
-    twist_of(p, b, v, twist)
-    sand, frame, rotation = equation.head(p).sand, equation.frame(p, b), equation.rotation(p, b)
-    return exports.deepest(
-        sand, equation.surface(p)[b], frame.ctypes.data, rotation.ctypes.data, twist.ctypes.data, h
-    )  # fmt: skip

@@ -16,7 +16,7 @@ from rftsim.solver import constraint_rows, equation, linear_algebra, matrices
 from rftsim.solver.equation import KIND, POINT
 from rftsim.solver.motion import felt_twist, generalised, speed_of
 from rftsim.solver.newton import hold, solve
-from rftsim.solver.sinking import deepest, sink
+from rftsim.solver.sinking import sink
 from rftsim.solver.step_equation import answer_to, force_to, prepare, reset
 from rftsim.solver.steps import BUDGET, RESERVE, worth
 
@@ -57,7 +57,7 @@ def _position_error(p, time):
     It is the mean square by the bodies' shares of the sand's force: what a grazing body errs by changes the motion
     little, for a force goes with the depth, and its share of all forces with it.
     """
-    after, start, late = equation.velocity_of(p, POINT.best), equation.start(p), equation.late(p)
+    start, late = equation.start(p), equation.late(p)
     stopped, pressed, began = equation.stopped(p), equation.pressed(p), equation.numbers(p).started > 0.0
     nbody, fineness = equation.head(p).nbody, FINENESS * equation.numbers(p).tolerance
     square, first, total = 0.0, 0.0, TINY
@@ -69,7 +69,7 @@ def _position_error(p, time):
         error = min(time * max(speed_of(p, b, late), by_sand) / 8.0, travel) / fineness
         if error <= SHALLOWEST:
             continue
-        depth = deepest(p, b, after, time)
+        depth = equation.depth_of(p, POINT.best, b)[0]
         if depth <= 0.0:
             continue
         square += share * (error / max(depth, SHALLOWEST)) ** 2

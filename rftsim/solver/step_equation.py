@@ -8,7 +8,7 @@ from rftsim.solver import constraint_rows, equation, linear_algebra, linearised,
 def prepare(p, h):
     """Set the equation's mass and its factors, and its step, for a time h."""
     numbers, mass, factors = equation.numbers(p), equation.mass(p), equation.mass_factors(p)
-    numbers.h, numbers.is_linearised = h, 0.0
+    numbers.h, numbers.is_linearised, numbers.is_stiff = h, 0.0, 0.0
     matrices.copy(p, equation.plain_mass(p), mass)
     if numbers.dragged > 0.0:
         matrices.add(p, equation.drag(p), h, mass)
