@@ -20,7 +20,7 @@ from rftsim.solver.sinking import sink
 from rftsim.solver.step_equation import answer_to, force_to, prepare, reset
 from rftsim.solver.steps import BUDGET, RESERVE, worth
 
-FINENESS: Final = 5.0
+FINENESS: Final = 7.5
 """Error of the position in a step, over the depth and the tolerance, above which the step is split."""
 SHALLOWEST: Final = 1e-4
 """Depth [m] below which none is resolved."""
