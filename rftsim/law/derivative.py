@@ -20,7 +20,7 @@ from rftsim.law.selection import CAPACITY, LOOK, choosing, chosen_on_stack, fill
 from rftsim.law.stress import TINY
 from rftsim.law.vectors import larger, smaller
 from rftsim.machine.compiling import loop, merged
-from rftsim.machine.memory import on_stack
+from rftsim.machine.memory import on_stack, peek, poke
 
 STEP_ASIDE: Final = 1e-7
 """Turn of the direction of motion [rad] by which the laws are differentiated."""
@@ -148,7 +148,7 @@ def derivative(response: Response, ground: Ground) -> Any:
             some = min(BLOCK, n - first)
             for column in range(columns):
                 for i in range(some):
-                    k[i + (_MATRIX + column) * BLOCK] = chosen[first + i + column * CAPACITY]
+                    poke(k, i + (_MATRIX + column) * BLOCK, peek(chosen, first + i + column * CAPACITY))
             fill(some, frame, medium, edge, v_c, completed, k)
             for row in range(3):
                 _add_rows(some, k, row, out)
@@ -183,7 +183,7 @@ def _add_rows(n, k, row, out):
     start = 3 * row * BLOCK
     for i in range(n):
         x, y, z = _column(k, COLUMN.x, i), _column(k, COLUMN.y, i), _column(k, COLUMN.z, i)
-        u, v, w = k[start + i], k[start + i + BLOCK], k[start + i + 2 * BLOCK]
+        u, v, w = peek(k, start + i), peek(k, start + i + BLOCK), peek(k, start + i + 2 * BLOCK)
         p, q, r = w * y - v * z, u * z - w * x, v * x - u * y  # by the angular velocity: velocity is omega x r
         f0, f1, f2, f3, f4, f5 = f0 + u, f1 + v, f2 + w, f3 + p, f4 + q, f5 + r
         x0, x1, x2, x3, x4, x5 = x0 + x * u, x1 + x * v, x2 + x * w, x3 + x * p, x4 + x * q, x5 + x * r

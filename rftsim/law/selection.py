@@ -24,7 +24,7 @@ LOOK: Final = 4 * BLOCK
 """Triangles that are looked at together, at most."""
 CAPACITY: Final = 392
 """Triangles that are evaluated together at most; no power of two, lest the columns share the cache's sets."""
-LANES: Final = 8
+LANES: Final = 4
 """They are filled up to a multiple of this with ones without area: what is left over of a vectorised loop is slow."""
 
 _columns, _scores = on_stack(ALL_COLUMNS * CAPACITY, types.float64), on_stack(LOOK, types.float64)
