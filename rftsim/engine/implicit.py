@@ -104,7 +104,7 @@ def _couple_trees(t, i, island, p):
 
 @inline
 def _fill_bodies(model, m, t, address, old, i, island, p):
-    """Fill the bodies of an island's equation, and what their motion couples."""
+    """Fill the bodies of an island's equation."""
     nv, place, first = islands.head(i).nv, islands.place_of(i), islands.body_start(i)[island]
     sand, v, w = equation.head(p).sand, doubles(stack_doubles(3), 3), doubles(stack_doubles(3), 3)
     for b in range(equation.head(p).nbody):
@@ -147,9 +147,9 @@ def _fill_mass(model, data, m, d, i, island, p):
     for k in range(first, first + islands.dof_count(i)[island]):
         dof, at = dofs[k], place[dofs[k]]
         for entry in range(start[dof], start[dof] + number[dof]):
-            other, number_there = peek(place, peek(column, entry)), peek(value, entry)
-            poke(out, n * at + other, number_there)
-            poke(out, n * other + at, number_there)
+            other, inertia = peek(place, peek(column, entry)), peek(value, entry)
+            poke(out, n * at + other, inertia)
+            poke(out, n * other + at, inertia)
 
 
 @inline

@@ -9,7 +9,7 @@ from rftsim.law.layout import BED_NUMBERS, HEADER_NUMBERS
 from rftsim.machine.compiling import exact, inline
 from rftsim.machine.memory import doubles, pointer, stack_doubles
 
-LOOK, PIECE = 2048, 512
+LOOK, PIECE = 4096, 512
 """Numbers of all surfaces of a bed that are looked at in one step, about, and in one go."""
 _TABLE, _TABLE_END = TABLE.start, TABLE.stop
 _fill_weight = types.ExternalFunction("rftsim_weigh", types.void(types.intp, types.intp, types.intp))

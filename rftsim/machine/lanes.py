@@ -49,7 +49,7 @@ def store(builder: Any, value: Any, data: Any, index: Any) -> None:
 
 
 def spread(builder: Any, number: Any, lanes: int = LANES) -> Any:
-    """A vector of one number."""
+    """A vector that has one number in each of its lanes."""
     kind = ir.VectorType(number.type, lanes)
     first = builder.insert_element(ir.Constant(kind, ir.Undefined), number, ir.Constant(ir.IntType(32), 0))
     return builder.shuffle_vector(first, first, ir.Constant(ir.VectorType(ir.IntType(32), lanes), [0] * lanes))
@@ -75,7 +75,7 @@ def add_product(builder: Any, one: Any, other: Any, place: Any) -> None:
 
 
 def number(k: int) -> Any:
-    """An index."""
+    """An index, as the code that is made takes it."""
     return ir.Constant(WORD, k)
 
 

@@ -79,7 +79,7 @@ def _across(builder: Any, sums: list[Any]) -> Any:
         )
         for one, other in (sums[:2], sums[2:])
     ]
-    low, high = (shuffled(builder, *pairs, places) for places in ([0, 1, 4, 5], [2, 3, 6, 7]))
+    low, high = (shuffled(builder, pairs[0], pairs[1], places) for places in ([0, 1, 4, 5], [2, 3, 6, 7]))
     return builder.fadd(low, high, flags=("fast",))
 
 

@@ -316,7 +316,7 @@ def wrench_of(p, k, b, later):
 
 @inline
 def answer_of(p, k, b):
-    """What the sand answers to a body's motion at point k, see `exports.ahead`, (AHEAD,)."""
+    """The sand's answer to a body's motion at point k: its wrenches and its depth, see `exports.ahead`, (AHEAD,)."""
     return _answers_of(p, head(p).nbody * k + b)
 
 

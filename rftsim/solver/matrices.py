@@ -13,7 +13,7 @@ from rftsim.solver import equation
 
 @exact
 def clear(p, a):
-    """Set a matrix to zero."""
+    """Set the numbers of a matrix to zero."""
     n = equation.head(p).ndof
     for k in range(n // LANES):
         tiles.clear(equation.tiles(p, k), 0, equation.tile_count(p)[k], LANES * k, n, a)

@@ -18,7 +18,7 @@ NONE: Final = -1
 
 @exact
 def begin(p):
-    """Let nothing be coupled."""
+    """Begin with a pattern in which nothing is coupled."""
     parent = equation.parent(p)
     for k in range(parent.size):
         parent[k] = NONE

@@ -70,20 +70,23 @@ def test_the_contract_of_all_is_gymnasiums():
 
 
 def test_the_sand_carries_an_ant_that_stands():
-    """It comes to rest within three seconds, at steps of 10 ms, and stays where it is."""
+    """It comes to rest within three seconds, at steps of 10 ms, and no coordinate of it changes from then on.
+
+    What is left of its speeds is of the size of v_c, at least 1e-5 m/s, below which a triangle's stress falls to zero.
+    """
     env = rftsim_envs.on_sand("Ant-v5", reset_noise_scale=0.0)
     env.reset(seed=0)
     model, data = env.unwrapped.model, env.unwrapped.data
     while data.time < 4.0:
         if data.time < 3.0:
-            start = data.qpos[:2].copy()
+            start = data.qpos.copy()
         _, _, terminated, _, info = env.step(np.zeros(8))
         assert not terminated
     weight = model.body_mass.sum() * 9.81
     assert rftsim.wrenches(model, data).force.sum(0)[2] == pytest.approx(weight, rel=0.01)
     assert data.ncon == 0
-    assert np.linalg.norm(data.qpos[:2] - start) < 1e-5
-    assert np.abs(data.qvel).max() < 1e-5
+    assert np.abs(data.qpos - start).max() < 1e-6
+    assert np.abs(data.qvel).max() < 3e-5
     assert info["reward_survive"] == 1.0
 
 
