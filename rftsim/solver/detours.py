@@ -119,6 +119,7 @@ def _ease(p):
         _linearise_apart(p, 1.0 if stage == 0 else fall)
         predict(p)
     numbers.v_c = sharp
+    linear_algebra.clear(equation.is_seen(p))
     attempt(p, POINT.now)
     keep_best(p, POINT.now)
     linear_algebra.clear(equation.is_fresh(p))

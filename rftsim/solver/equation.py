@@ -110,6 +110,12 @@ is_fresh = _T.vector("nbody")
 """Whether a body's derivative was taken at the present point, (nbody,)."""
 strain, _ = _T.each("nbody", WRENCH)
 """What holds a body at rest, as a twist that the law feels beside the motion, (6,)."""
+is_seen = _T.vector("nbody")
+"""Whether a body's force was evaluated since the equation was begun, as it is now, (nbody,)."""
+seen_twist, _ = _T.each("nbody", WRENCH)
+"""The twist that the law last felt in that, (6,)."""
+seen_answer, _ = _T.each("nbody", AHEAD)
+"""The sand's answer to it, (AHEAD,)."""
 misfit = _T.vector("nbody")
 """Change of a body's force that its derivative did not foresee [N], (nbody,)."""
 

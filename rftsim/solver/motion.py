@@ -3,6 +3,8 @@
 All twists and wrenches are about the body's origin, in world axes: velocity or force first.
 """
 
+from typing import Final
+
 import numpy as np
 
 from rftsim.law import exports, step_frame
@@ -10,6 +12,12 @@ from rftsim.machine import lanes
 from rftsim.machine.compiling import exact, fast
 from rftsim.machine.memory import doubles, peek, poke, stack_doubles
 from rftsim.solver import equation, linear_algebra
+
+AT_REST: Final = 0.1
+"""Error of a body's velocity that is allowed however slow it is, over v_c."""
+ALIKE: Final = 0.5
+"""Difference of two twists of a body, over that error, up to which its derivative tells the force of one from that of
+the other."""
 
 
 @fast
@@ -78,12 +86,41 @@ def respond(p, b, twist, out):
 
 @exact
 def evaluate(p, v, k):
-    """Evaluate the wrenches at a velocity into point k."""
-    twist = doubles(stack_doubles(6), 6)
-    for b in range(equation.head(p).nbody):
+    """Evaluate the wrenches at a velocity into point k, of bodies whose motion differs from when they last were."""
+    twist, seen = doubles(stack_doubles(6), 6), equation.is_seen(p)
+    nbody, count = equation.head(p).nbody, 0.0
+    for b in range(nbody):
+        answer = equation.answer_of(p, k, b)
         felt_twist(p, b, v, twist)
-        respond(p, b, twist, equation.answer_of(p, k, b))
-    equation.work(p).evaluations += 1.0
+        if seen[b] == 0.0 or not _is_foreseen(p, b, twist, answer):
+            respond(p, b, twist, answer)
+            linear_algebra.copy(twist, equation.seen_twist(p, b))
+            linear_algebra.copy(answer, equation.seen_answer(p, b))
+            seen[b], count = 1.0, count + 1.0
+    equation.work(p).evaluations += count / nbody
+
+
+@exact
+def _is_foreseen(p, b, twist, out):
+    """Whether a twist of body b hardly differs from the last evaluated one; then out is filled by the derivative."""
+    change, wrench, known = doubles(stack_doubles(6), 6), doubles(stack_doubles(6), 6), equation.seen_twist(p, b)
+    for r in range(6):
+        change[r] = twist[r] - known[r]
+    length = equation.length(p)[b]
+    if equation.kept(p, b).known == 0.0 or size_of(change, length) > ALIKE * allowed_at(p, size_of(twist, length)):
+        return False
+    linear_algebra.multiply(equation.derivative(p, b), change, wrench)
+    linear_algebra.copy(equation.seen_answer(p, b), out)
+    for r in range(6):
+        out[r] += wrench[r]
+        out[6 + r] += wrench[r]
+    return True
+
+
+@exact
+def allowed_at(p, speed):
+    """The error that a body's velocity may have at a speed [m/s]."""
+    return equation.numbers(p).tolerance * speed + AT_REST * equation.numbers(p).v_c
 
 
 @exact

@@ -1,16 +1,11 @@
 """The impulse that is missing in the equation at a tried velocity, and how far that is from the solution."""
 
-from typing import Final
-
 import numpy as np
 
 from rftsim.law.stress import TINY
 from rftsim.machine.compiling import exact
 from rftsim.solver import constraint_rows, equation, linear_algebra, matrices
-from rftsim.solver.motion import evaluate, generalised, speed_of
-
-AT_REST: Final = 0.1
-"""Error of a body's velocity that is allowed however slow it is, over v_c."""
+from rftsim.solver.motion import allowed_at, evaluate, generalised, speed_of
 
 
 @exact
@@ -78,7 +73,7 @@ def _pressed(p, v, q):
 @exact
 def allowed(p, b, v):
     """The error that body b's velocity may have at a generalised velocity [m/s]."""
-    return equation.numbers(p).tolerance * speed_of(p, b, v) + AT_REST * equation.numbers(p).v_c
+    return allowed_at(p, speed_of(p, b, v))
 
 
 @exact
