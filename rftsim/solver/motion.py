@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from rftsim.law import exports, step_frame
+from rftsim.law.layout import WRENCH
 from rftsim.machine import lanes
 from rftsim.machine.compiling import exact, fast
 from rftsim.machine.memory import doubles, peek, poke, stack_doubles
@@ -17,7 +18,7 @@ AT_REST: Final = 0.1
 """Error of a body's velocity that is allowed however slow it is, over v_c."""
 ALIKE: Final = 0.5
 """Difference of two twists of a body, over that error, up to which its derivative tells the force of one from that of
-the other."""
+the other, where that changes little."""
 
 
 @fast
@@ -110,10 +111,13 @@ def _is_foreseen(p, b, twist, out):
     if equation.kept(p, b).known == 0.0 or size_of(change, length) > ALIKE * allowed_at(p, size_of(twist, length)):
         return False
     linear_algebra.multiply(equation.derivative(p, b), change, wrench)
+    most = equation.numbers(p).tolerance * size_of(equation.seen_answer(p, b)[:WRENCH], 1.0 / length)
+    if not size_of(wrench, 1.0 / length) <= most:  # at rest the force jumps, and a derivative is that of elsewhere
+        return False
     linear_algebra.copy(equation.seen_answer(p, b), out)
-    for r in range(6):
+    for r in range(WRENCH):
         out[r] += wrench[r]
-        out[6 + r] += wrench[r]
+        out[WRENCH + r] += wrench[r]
     return True
 
 
