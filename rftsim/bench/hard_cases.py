@@ -18,7 +18,7 @@ from rftsim.bench.trials import REST, Force, HardCase, Judged, Quantities, Trial
 from rftsim.bench.wheel_cases import WHEELS
 
 CAPACITY: Final = 10.84
-"""Sideways force at which the standing legs break away, as `capacity_of_legs` finds it in the median of time steps [N]."""
+"""Sideways force [N] at which the standing legs break away, the median of what `capacity_of_legs` finds."""
 
 
 def legs(h: float, force: Force) -> Trial:
