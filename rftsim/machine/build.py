@@ -127,7 +127,8 @@ def ship() -> None:
     link, given = _alone()
     made = {part: link.is_made_from(link.shipped_file(part), link.key_of(part, given[part])) for part in _PARTS}
     changed = [part for part in _PARTS if not made[part]]
-    with ProcessPoolExecutor(mp_context=multiprocessing.get_context("spawn")) as processes:
+    apart = multiprocessing.get_context("spawn")  # what a process compiled before changes what it makes next
+    with ProcessPoolExecutor(mp_context=apart, max_tasks_per_child=1) as processes:
         list(processes.map(_ship_part, changed))
     link.SUMS.write_text("".join(f"{link.sum_of(path)}  {path.name}\n" for path in sorted(link.SHIPPED.glob("*.xz"))))
 
