@@ -327,12 +327,6 @@ def answer_of(p, k, b):
 
 
 @inline
-def depth_of(p, k, b):
-    """The mean depth of a body's triangles that the sand acts on [m], now or after the step, (1,)."""
-    return doubles(answer_of(p, k, b).ctypes.data + 16 * WRENCH, 1)
-
-
-@inline
 def answers_of(p, k):
     """All bodies' answers at point k, (AHEAD nbody,)."""
     return doubles(answer_of(p, k, 0).ctypes.data, AHEAD * head(p).nbody)

@@ -10,6 +10,7 @@ from typing import Final
 
 import numpy as np
 
+from rftsim.law.exports import AHEAD
 from rftsim.law.stress import TINY
 from rftsim.machine.compiling import exact
 from rftsim.solver import constraint_rows, equation, linear_algebra, matrices
@@ -69,7 +70,7 @@ def _position_error(p, time):
         error = min(time * max(speed_of(p, b, late), by_sand) / 8.0, travel) / fineness
         if error <= SHALLOWEST:
             continue
-        depth = equation.depth_of(p, POINT.best, b)[0]
+        depth = equation.answer_of(p, POINT.best, b)[AHEAD - 1]
         if depth <= 0.0:
             continue
         square += share * (error / max(depth, SHALLOWEST)) ** 2
