@@ -18,14 +18,13 @@ from rftsim.law.layout import BLOCK, COLUMN, COLUMNS
 from rftsim.law.leading import may_lead
 from rftsim.law.vectors import larger, smaller
 from rftsim.machine.compiling import inline, inline_loop
+from rftsim.machine.lanes import LANES
 from rftsim.machine.memory import on_stack, peek, poke
 
 LOOK: Final = 4 * BLOCK
 """Triangles that are looked at together, at most."""
 CAPACITY: Final = 392
 """Triangles that are evaluated together at most; no power of two, lest the columns share the cache's sets."""
-LANES: Final = 4
-"""They are filled up to a multiple of this with ones without area: what is left over of a vectorised loop is slow."""
 
 _columns, _scores = on_stack(ALL_COLUMNS * CAPACITY, types.float64), on_stack(LOOK, types.float64)
 _indices = on_stack(LOOK, types.int64)
@@ -72,7 +71,10 @@ def area(chosen, i):
 
 @inline
 def filled_up(chosen, n):
-    """How many are chosen after ones without area made their number a multiple of LANES."""
+    """How many are chosen after ones without area made their number a multiple of LANES.
+
+    What is left over of a vectorised loop is slow.
+    """
     while n % LANES != 0:
         for column in range(COLUMN.area):
             poke(chosen, n + column * CAPACITY, peek(chosen, column * CAPACITY))

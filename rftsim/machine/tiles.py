@@ -1,7 +1,7 @@
 """Loops over tiles of LANES rows and columns of a matrix, whose numbers stand row by row, n to a row.
 
-Which tiles is told by columns, a rising list of the first columns of tiles, of which those from `first` up to before
-`last` are taken. A tile is named by its first row and its first column.
+Which tiles is told by columns, a rising list of the first columns of tiles, of which `count`, or those from `first` up
+to before `last`, are taken. A tile is named by its first row and its first column.
 """
 
 from collections.abc import Iterator
@@ -116,66 +116,64 @@ multiply_and_add = _multiplying(True)
 
 @contextmanager
 def _each_row(context: Any, builder: Any, signature: Any, arguments: Any) -> Iterator[Any]:
-    """A loop over the rows of tiles, for functions that begin with columns, first, last, row and n: place, column."""
-    columns, (_, first, last, row, n) = data_of(context, builder, signature, arguments, 0), arguments[:5]
-    with _each(builder, columns, first, last) as column, cgutils.for_range(builder, number(LANES)) as each:
+    """A loop over the rows of tiles, for functions that begin with columns, count, row and n: place, column."""
+    columns, (_, count, row, n) = data_of(context, builder, signature, arguments, 0), arguments[:4]
+    with _each(builder, columns, number(0), count) as column, cgutils.for_range(builder, number(LANES)) as each:
         yield builder.add(builder.mul(builder.add(row, each.index), n), column), column
 
 
 @intrinsic
-def clear(typing_context: Any, columns: Any, first: Any, last: Any, row: Any, n: Any, out: Any) -> Any:
+def clear(typing_context: Any, columns: Any, count: Any, row: Any, n: Any, out: Any) -> Any:
     """Set tiles of out to zero."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        target = data_of(context, builder, signature, arguments, 5)
+        target = data_of(context, builder, signature, arguments, 4)
         with _each_row(context, builder, signature, arguments) as (place, _):
             store(builder, ir.Constant(VECTOR, [0.0] * LANES), target, place)
 
-    return types.void(columns, *[types.intp] * 4, out), generate
+    return types.void(columns, *[types.intp] * 3, out), generate
 
 
 @intrinsic
-def copy(typing_context: Any, columns: Any, first: Any, last: Any, row: Any, n: Any, a: Any, out: Any) -> Any:
+def copy(typing_context: Any, columns: Any, count: Any, row: Any, n: Any, a: Any, out: Any) -> Any:
     """Copy tiles of a to out."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        matrix, target = (data_of(context, builder, signature, arguments, k) for k in (5, 6))
+        matrix, target = (data_of(context, builder, signature, arguments, k) for k in (4, 5))
         with _each_row(context, builder, signature, arguments) as (place, _):
             store(builder, load(builder, matrix, place), target, place)
 
-    return types.void(columns, *[types.intp] * 4, a, out), generate
+    return types.void(columns, *[types.intp] * 3, a, out), generate
 
 
 @intrinsic
-def add(
-    typing_context: Any, columns: Any, first: Any, last: Any, row: Any, n: Any, share: Any, a: Any, out: Any
-) -> Any:
+def add(typing_context: Any, columns: Any, count: Any, row: Any, n: Any, share: Any, a: Any, out: Any) -> Any:
     """Add a share of tiles of a to those of out."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        matrix, target = (data_of(context, builder, signature, arguments, k) for k in (6, 7))
-        factor = spread(builder, arguments[5])
+        matrix, target = (data_of(context, builder, signature, arguments, k) for k in (5, 6))
+        factor = spread(builder, arguments[4])
         with _each_row(context, builder, signature, arguments) as (place, _):
             product = builder.fmul(factor, load(builder, matrix, place), flags=FUSED)
             store(builder, builder.fadd(load(builder, target, place), product, flags=FUSED), target, place)
 
-    return types.void(columns, *[types.intp] * 4, types.float64, a, out), generate
+    return types.void(columns, *[types.intp] * 3, types.float64, a, out), generate
 
 
 @intrinsic
 def add_difference(
-    typing_context: Any, columns: Any, first: Any, last: Any, row: Any, n: Any, shares: Any, a: Any, b: Any, out: Any
+    typing_context: Any, columns: Any, count: Any, row: Any, n: Any, shares: Any, a: Any, b: Any, out: Any
 ) -> Any:
     """Add tiles of a less those of b, each column by a share, to those of out."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        factors, one, other, target = (data_of(context, builder, signature, arguments, k) for k in (5, 6, 7, 8))
+        factors, one, other, target = (data_of(context, builder, signature, arguments, k) for k in (4, 5, 6, 7))
         with _each_row(context, builder, signature, arguments) as (place, column):
             change = builder.fsub(load(builder, one, place), load(builder, other, place))
             product = builder.fmul(load(builder, factors, column), change, flags=FUSED)
             store(builder, builder.fadd(load(builder, target, place), product, flags=FUSED), target, place)
 
-    return types.void(columns, *[types.intp] * 4, shares, a, b, out), generate
+    return types.void(columns, *[types.intp] * 3, shares, a, b, out), generate
 
 
 def _reduced(builder: Any, rows: list[Any], k: int) -> list[Any]:
@@ -223,21 +221,21 @@ def divide(typing_context: Any, a: Any, row: Any, column: Any, n: Any) -> Any:
 
 
 @intrinsic
-def eliminate(typing_context: Any, columns: Any, first: Any, last: Any, a: Any, row: Any, pivot: Any, n: Any) -> Any:
+def eliminate(typing_context: Any, columns: Any, count: Any, a: Any, row: Any, pivot: Any, n: Any) -> Any:
     """Take from tiles of a row of a the product of that in column `pivot` and those of row `pivot` above them."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        places, matrix = (data_of(context, builder, signature, arguments, k) for k in (0, 3))
-        _, first, last, _, row, pivot, n = arguments
+        places, matrix = (data_of(context, builder, signature, arguments, k) for k in (0, 2))
+        _, count, _, row, pivot, n = arguments
         starts, others = _starts(builder, row, n), _starts(builder, pivot, n)
         sums = [zero_sum(builder) for _ in _ROWS]
-        with _each(builder, places, first, last) as column:
+        with _each(builder, places, number(0), count) as column:
             for total, vector in zip(sums, _vectors(builder, matrix, starts, column), strict=True):
                 builder.store(builder.fneg(vector), total)
             _add_tiles(builder, matrix, (starts, pivot), _vectors(builder, matrix, others, column), sums)
             _keep(builder, _negative(builder, sums), matrix, starts, column)
 
-    return types.void(columns, types.intp, types.intp, a, *[types.intp] * 3), generate
+    return types.void(columns, types.intp, a, *[types.intp] * 3), generate
 
 
 @intrinsic

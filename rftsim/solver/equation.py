@@ -200,10 +200,10 @@ linear = _T.vector("ndof", "ndof")
 """Scratch: M - h J' G J, G the sand's derivatives, (ndof^2,)."""
 linear_factors = _T.vector("ndof", "ndof")
 """Scratch: factors of the same with the rows' stiffness, (ndof^2,)."""
-twists = _T.matrix(WRENCH, "ndof")
-"""Scratch: -h times the twists of a body by the degrees of freedom of its path, row by row of a width, (6, ndof)."""
-wrenches = _T.matrix(WRENCH, "ndof")
-"""Scratch: the wrenches that follow from these, likewise, (6, ndof)."""
+twists = _T.vector(WRENCH, "ndof")
+"""Scratch: -h times the twists of a body by the degrees of freedom of its path, row by row of a width, (6 ndof,)."""
+wrenches = _T.vector(WRENCH, "ndof")
+"""Scratch: the wrenches that follow from these, likewise, (6 ndof,)."""
 power = _T.vector("ndof")
 """Scratch: their power on one degree of freedom of the path, (ndof,)."""
 stiff_mass = _T.vector("ndof", "ndof")

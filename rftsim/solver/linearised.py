@@ -6,7 +6,7 @@ from rftsim.law.layout import WRENCH
 from rftsim.law.stress import TINY
 from rftsim.machine import lanes
 from rftsim.machine.compiling import exact, fast
-from rftsim.machine.memory import doubles, peek, poke
+from rftsim.machine.memory import peek, poke
 from rftsim.solver import constraint_rows, equation, linear_algebra, matrices
 
 NONE: Final = 0
@@ -41,8 +41,7 @@ def _add_derivative(p, b, g, a):
     """Add -h J' G J to a matrix, G the derivative of body b's wrench by its twist."""
     path, n, ndof = equation.path(p, b), equation.path_length(p)[b], equation.head(p).ndof
     width, power = lanes.padded(n), equation.power(p)
-    twists = doubles(equation.twists(p).ctypes.data, WRENCH * width)
-    wrenches = doubles(equation.wrenches(p).ctypes.data, WRENCH * width)
+    twists, wrenches = equation.twists(p), equation.wrenches(p)
     _turn(p, b, n, width, twists)
     for r in range(WRENCH):
         lanes.combine_six(g[r], twists, width, wrenches[r * width : (r + 1) * width])

@@ -16,7 +16,7 @@ def clear(p, a):
     """Set the numbers of a matrix to zero."""
     n = equation.head(p).ndof
     for k in range(n // LANES):
-        tiles.clear(equation.tiles(p, k), 0, equation.tile_count(p)[k], LANES * k, n, a)
+        tiles.clear(equation.tiles(p, k), equation.tile_count(p)[k], LANES * k, n, a)
 
 
 @exact
@@ -24,7 +24,7 @@ def copy(p, a, out):
     """Fill the matrix out with the numbers of A."""
     n = equation.head(p).ndof
     for k in range(n // LANES):
-        tiles.copy(equation.tiles(p, k), 0, equation.tile_count(p)[k], LANES * k, n, a, out)
+        tiles.copy(equation.tiles(p, k), equation.tile_count(p)[k], LANES * k, n, a, out)
 
 
 @exact
@@ -32,7 +32,7 @@ def add(p, a, share, out):
     """Add a share of a matrix A to the matrix out."""
     n = equation.head(p).ndof
     for k in range(n // LANES):
-        tiles.add(equation.tiles(p, k), 0, equation.tile_count(p)[k], LANES * k, n, share, a, out)
+        tiles.add(equation.tiles(p, k), equation.tile_count(p)[k], LANES * k, n, share, a, out)
 
 
 @exact
@@ -40,7 +40,7 @@ def add_difference(p, a, b, share, out):
     """Add A - B, each column by its own share, to the matrix out."""
     n = equation.head(p).ndof
     for k in range(n // LANES):
-        tiles.add_difference(equation.tiles(p, k), 0, equation.tile_count(p)[k], LANES * k, n, share, a, b, out)
+        tiles.add_difference(equation.tiles(p, k), equation.tile_count(p)[k], LANES * k, n, share, a, b, out)
 
 
 @exact
@@ -63,7 +63,7 @@ def factor(p, a):
         tiles.invert(a, row, n)
         for i in range(count):
             tiles.divide(a, own[i], row, n)
-            tiles.eliminate(own, 0, count, a, own[i], row, n)
+            tiles.eliminate(own, count, a, own[i], row, n)
     for k in range(n // LANES):
         own, count, row = equation.tiles(p, k), equation.before(p)[k], LANES * k
         for i in range(count):
