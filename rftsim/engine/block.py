@@ -48,11 +48,12 @@ state that lasts; the terrain's place in numeric_data and its size, zero where t
 terrain's and the bed's sealed numbers, see `checks`."""
 MEMBER: Final = np.dtype(
     [
-        *((name, "i8") for name in ("body", "start", "size", "looked_at")),
+        *((name, "i8") for name in ("body", "start", "read", "size", "looked_at")),
         *((name, "f8") for name in ("weight", "header_weight", "weight_so_far", "ntri", "wheel_radius")),
     ]
 )
-"""A body's id; its surface's place in numeric_data, and how many numbers it has; how many were looked at since their
+"""A body's id; its surface's place in numeric_data, and that of the first one with the same numbers, which is read in
+its stead, as it is at hand; how many numbers it has; how many were looked at since their
 weight was last compared; their weight and that of the header; that of those looked at; what the size follows from."""
 COUNTERS: Final = np.dtype(
     [

@@ -123,7 +123,13 @@ def body(address, k):
 
 @exact
 def surface(model, m, address, k):
-    """The address of the surface of the k-th body of a block."""
+    """The address of the surface of the k-th body of a block, or of another's with the same numbers."""
+    return pointer(m + model.numeric_data) + 8 * member(address, k).read
+
+
+@exact
+def own_surface(model, m, address, k):
+    """The address of the surface that was written for the k-th body of a block."""
     return pointer(m + model.numeric_data) + 8 * member(address, k).start
 
 

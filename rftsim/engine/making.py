@@ -79,4 +79,21 @@ def _fill_member(model, m, address, body, owner, bed_name):
     while member.looked_at < member.size:
         sound.look(at, member)
     member.weight = sound.looked(member)
+    member.read = _first_like(address, member, pointer(m + model.numeric_data))
     return True
+
+
+@exact
+def _first_like(address, member, numbers):
+    """Where the surface of the first member lies that has the same numbers as a member's, which may be its own."""
+    own = int64s(numbers + 8 * member.start, member.size)
+    for k in range(instance.head(address).nbody):
+        other = instance.member(address, k)
+        if other.size != member.size or other.weight != member.weight:
+            continue
+        theirs, n = int64s(numbers + 8 * other.start, other.size), 0
+        while n < own.size and own[n] == theirs[n]:
+            n += 1
+        if n == own.size:
+            return other.start
+    return member.start

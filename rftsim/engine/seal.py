@@ -54,7 +54,7 @@ SEALED: Final = np.array(
     dtype=np.int64,
 )
 """Places of the numbers of a bed that its seal covers."""
-WEIGHED: Final = 256
+WEIGHED: Final = 128
 """Numbers that are weighed together at each step, to see whether they were changed."""
 WEIGHTS: Final = 0.5 + np.arange(1, 1 + WEIGHED) * (5**0.5 - 1) / 2 % 1.0
 """Weights of their places."""

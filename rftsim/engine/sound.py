@@ -37,7 +37,7 @@ def is_sound(model, m, address, state_size):
         return False
     for k in range(head.nbody):
         member = instance.member(address, k)
-        if member.start > end - member.size or not _has_header(instance.surface(model, m, address, k), member):
+        if member.start > end - member.size or not _has_header(instance.own_surface(model, m, address, k), member):
             return False
     return _look_on(model, m, address)
 
@@ -71,7 +71,7 @@ def _look_on(model, m, address):
     head, left, through = instance.head(address), LOOK, 0
     while left > 0 and through < head.nbody:
         member = instance.member(address, head.looking)
-        left -= look(instance.surface(model, m, address, head.looking), member)
+        left -= look(instance.own_surface(model, m, address, head.looking), member)
         if member.looked_at >= member.size:
             through += 1
             head.looking = head.looking + 1 if head.looking + 1 < head.nbody else 0

@@ -18,7 +18,7 @@ from rftsim.law.layout import BLOCK, COLUMN, COLUMNS
 from rftsim.law.leading import may_lead
 from rftsim.law.vectors import larger, smaller
 from rftsim.machine.compiling import inline, inline_loop
-from rftsim.machine.lanes import LANES
+from rftsim.machine.lanes import WIDE
 from rftsim.machine.memory import on_stack, peek, poke
 
 LOOK: Final = 4 * BLOCK
@@ -71,11 +71,11 @@ def area(chosen, i):
 
 @inline
 def filled_up(chosen, n):
-    """How many are chosen after ones without area made their number a multiple of LANES.
+    """How many are chosen after ones without area made their number a multiple of WIDE.
 
     What is left over of a vectorised loop is slow.
     """
-    while n % LANES != 0:
+    while n % WIDE != 0:
         for column in range(COLUMN.area):
             poke(chosen, n + column * CAPACITY, peek(chosen, column * CAPACITY))
         poke(chosen, n + COLUMN.area * CAPACITY, 0.0)

@@ -37,8 +37,8 @@ _UNCOUNTED: Final = r"define linkonce_odr void \1(ptr %memory) alwaysinline { re
 """How numba counts references to an array, and how it does not: each is a view of memory that nobody counts."""
 
 
-def build(part: str, cpu: str | None = None) -> bytes:
-    """The object file of a part, for this processor, or for one that numba was told of."""
+def build(part: str, target: Any = None) -> bytes:
+    """The object file of a part, for this processor, or for one of `targets` that numba was told of."""
     for module in _PARTS[part]:
         importlib.import_module(module)
     from rftsim.machine.exports import EXPORTED
@@ -55,7 +55,7 @@ def build(part: str, cpu: str | None = None) -> bytes:
         code = _RAISED.sub(r"\1 zeroinitializer", compiled.inspect_llvm(signature.args))
         whole.link_in(llvm.parse_assembly(_COUNTING.sub(_UNCOUNTED, code)))
         whole.link_in(llvm.parse_assembly(_entry(name, signature, result.fndesc.mangled_name)))
-    machine = _machine(cpu)
+    machine = _machine(target)
     _strip(whole, own, machine)
     _optimise(whole, machine)
     return bytes(machine.emit_object(whole))
@@ -87,11 +87,12 @@ def _entry(name: str, signature: Any, compiled: str) -> str:
     """
 
 
-def _machine(cpu: str | None) -> llvm.TargetMachine:
+def _machine(target: Any) -> llvm.TargetMachine:
     """Make what emits code as numba's own does."""
-    features = llvm.get_host_cpu_features().flatten() if cpu is None else ""
+    cpu = target.name if target else llvm.get_host_cpu_name()
+    features = target.tuned if target else llvm.get_host_cpu_features().flatten()
     return llvm.Target.from_default_triple().create_target_machine(
-        cpu=cpu or llvm.get_host_cpu_name(), features=features, opt=3, reloc="static", codemodel="jitdefault", jit=True
+        cpu=cpu, features=features, opt=3, reloc="static", codemodel="jitdefault", jit=True
     )
 
 
@@ -125,11 +126,16 @@ def ship() -> None:
         OSError: One cannot be written.
     """
     link, given = _alone()
-    made = {part: link.is_made_from(link.shipped_file(part), link.key_of(part, given[part])) for part in _PARTS}
-    changed = [part for part in _PARTS if not made[part]]
+    changed = [
+        (part, place)
+        for part in _PARTS
+        for place, target in enumerate(link.TARGETS[part])
+        if not link.is_made_from(link.shipped_file(part, target), link.key_of(part, given[part]))
+    ]
     apart = multiprocessing.get_context("spawn")  # what a process compiled before changes what it makes next
     with ProcessPoolExecutor(mp_context=apart, max_tasks_per_child=1) as processes:
-        list(processes.map(_ship_part, changed))
+        for done in [processes.submit(_ship_part, *one) for one in changed]:
+            done.result()
     link.SUMS.write_text("".join(f"{link.sum_of(path)}  {path.name}\n" for path in sorted(link.SHIPPED.glob("*.xz"))))
 
 
@@ -143,12 +149,13 @@ def _alone() -> tuple[Any, dict[str, str]]:
     return link, {"law": laws.GIVEN, "solver": laws.GIVEN, "engine": structs.GIVEN}
 
 
-def _ship_part(part: str) -> None:
-    logging.basicConfig(level=logging.INFO, format="%(message)s")
+def _ship_part(part: str, place: int) -> None:
     link, given = _alone()
-    numba.config.CPU_NAME, numba.config.CPU_FEATURES = link.SHIPPED_FOR, ""
-    path = link.shipped_file(part)
-    if not link.write(path, link.key_of(part, given[part]), build(part, link.SHIPPED_FOR)):
+    target = link.TARGETS[part][place]
+    logging.basicConfig(level=logging.INFO, format=f"{target.name}: %(message)s")
+    numba.config.CPU_NAME, numba.config.CPU_FEATURES = target.name, target.tuned
+    path = link.shipped_file(part, target)
+    if not link.write(path, link.key_of(part, given[part]), build(part, target)):
         raise OSError(f"cannot write {path}")
 
 

@@ -6,14 +6,17 @@ A loop of a dozen rounds that is made into vectors as it is written spends its t
 from typing import Any, Final
 
 from llvmlite import ir
-from numba import types
+from numba import config, types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
 from rftsim.machine.compiling import inline
+from rftsim.machine.targets import AVX512
 
 LANES: Final = 4
 """Numbers that are worked on at once; sizes that these functions are given are multiples of it."""
+WIDE: Final = 2 * LANES if AVX512.name == config.CPU_NAME else LANES
+"""The same of the widest vectors that the optimiser makes for the processor that is compiled for."""
 FUSED: Final = ("contract",)
 """How products are added: fused, where the processor can."""
 WORD: Final = ir.IntType(64)

@@ -1,7 +1,7 @@
 """Machine code of the entries: what ships where it fits, else what was compiled before, else compiled now.
 
-It is made by `build` in parts, each an object file of LLVM. What ships is for x86-64-v3 under Linux and was made
-from these very sources; then neither numba nor a cache is needed.
+It is made by `build` in parts, each an object file of LLVM. What ships is for `targets` under Linux and was made from
+these very sources; then neither numba nor a cache is needed.
 """
 
 import ctypes
@@ -22,15 +22,14 @@ import llvmlite.binding as llvm
 from rftsim.errors import RftsimError
 from rftsim.files import replacing
 from rftsim.machine.sources import PACKAGE, source_of
+from rftsim.machine.targets import TARGETS, Target
 
 SHIPPED: Final = Path(__file__).parent / "shipped"
 SUMS: Final = SHIPPED / "SHA256SUMS"
 """The SHA-256 of each object file that ships, as `sha256sum` writes them; one that is not as listed is not linked."""
-SHIPPED_FOR: Final = "x86-64-v3"
 KEPT: Final = "rftsim-machine"
 """The folder for what was compiled here."""
 _LOG: Final = logging.getLogger(__name__)
-_FEATURES: Final = ("avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe")
 
 
 @functools.cache
@@ -76,8 +75,10 @@ def _engine() -> llvm.ExecutionEngine:
 def object_file(part: str, given: str) -> bytes:
     """The object file of a part: what ships, what was compiled before, or what is compiled now."""
     key = key_of(part, given)
-    if takes_shipped() and is_as_listed(shipped_file(part)) and (code := _read(shipped_file(part), key)) is not None:
-        return code
+    for target in filter(runs, TARGETS[part]):
+        path = shipped_file(part, target)
+        if is_as_listed(path) and (code := _read(path, key)) is not None:
+            return code
     machine = f"{llvm.get_host_cpu_name()} {llvm.get_host_cpu_features().flatten()} {llvmlite.__version__}"
     key = hashlib.sha256(key + machine.encode()).digest()
     name = f"rftsim-{part}-{key.hex()[:16]}.o.xz"
@@ -129,9 +130,9 @@ def key_of(part: str, given: str) -> bytes:
     return hashlib.sha256(source_of(part) + given.encode()).digest()
 
 
-def shipped_file(part: str) -> Path:
-    """Where a part lies that ships with the package."""
-    return SHIPPED / f"{part}-{SHIPPED_FOR}.o.xz"
+def shipped_file(part: str, target: Target) -> Path:
+    """Where a part lies that ships with the package, as it was made for a level of processors."""
+    return SHIPPED / f"{part}-{target.name}.o.xz"
 
 
 def sum_of(path: Path) -> str:
@@ -147,13 +148,13 @@ def is_as_listed(path: Path) -> bool:
         return False
 
 
-def takes_shipped() -> bool:
-    """Whether this process can run what ships."""
+def runs(target: Target) -> bool:
+    """Whether this process can run what ships for a level of processors."""
     triple = llvm.get_process_triple()
     if not (triple.startswith("x86_64") and "linux" in triple):
         return False
     features = llvm.get_host_cpu_features()
-    return all(features.get(name, False) for name in _FEATURES)
+    return all(features.get(name, False) for name in target.needs)
 
 
 def folders() -> list[Path]:

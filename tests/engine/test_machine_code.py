@@ -15,6 +15,7 @@ import rftsim
 from rftsim.engine import layout
 from rftsim.law import layout as laws
 from rftsim.machine import build, link, sources
+from rftsim.machine.targets import AVX2, AVX512, TARGETS
 
 PACKAGE = Path(rftsim.__file__).parent
 MODELS = Path(__file__).parents[2] / "models"
@@ -79,11 +80,11 @@ def fresh(tmp_path):
     return tmp_path / "fresh"
 
 
-@pytest.mark.parametrize("part", PARTS)
-def test_what_ships_was_made_from_these_sources(part):
+@pytest.mark.parametrize(("part", "target"), [(part, target) for part in PARTS for target in TARGETS[part]])
+def test_what_ships_was_made_from_these_sources(part, target):
     """Its key is that of the sources, and of MuJoCo's constants."""
     key = link.key_of(part, PARTS[part])
-    shipped = link.shipped_file(part).read_bytes()
+    shipped = link.shipped_file(part, target).read_bytes()
     assert shipped.startswith(key), "compiled code was edited: `make native` makes its machine code anew"
     assert len(shipped) < 300_000
 
@@ -105,7 +106,16 @@ def test_every_source_of_machine_code_counts():
                     assert found in files, f"{name} imports {found}, which is not among sources.FILES"
 
 
-@pytest.mark.skipif(not link.takes_shipped(), reason="what ships is for another processor")
+@pytest.mark.skipif(not link.runs(AVX512), reason="this processor has no wide vectors")
+def test_wide_vectors_move_the_wheel_as_narrow_ones_do(fresh):
+    """Without what ships for AVX-512 that for AVX2 is taken, and gives the same numbers but for rounding."""
+    (fresh / "rftsim" / link.shipped_file("law", AVX512).relative_to(PACKAGE)).unlink()
+    narrow, wide = first_force(fresh), first_force(PACKAGE.parent)
+    assert "numba" not in narrow["heavy"]
+    np.testing.assert_allclose(narrow["numbers"], wide["numbers"], rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.skipif(not link.runs(AVX2), reason="what ships is for another processor")
 def test_first_force_compiles_nothing(fresh):
     """A first force costs at most 5 starts of MuJoCo, with Python's own cache or without; and it keeps no cache.
 
@@ -144,7 +154,7 @@ def compiler(monkeypatch):
         made.append(part)
         return b"machine code of " + part.encode()
 
-    monkeypatch.setattr(link, "takes_shipped", lambda: False)
+    monkeypatch.setattr(link, "runs", lambda target: False)
     monkeypatch.setattr(build, "build", compile_part)
     return made
 

@@ -11,6 +11,7 @@ import pytest
 
 import rftsim
 from rftsim.machine import link
+from rftsim.machine.targets import AVX2
 
 PACKAGE = Path(rftsim.__file__).parent
 KEY = 32
@@ -29,7 +30,7 @@ def test_another_byte_is_noticed(tmp_path, monkeypatch):
     for path in (*link.SHIPPED.glob("*.xz"), link.SUMS):
         shutil.copy(path, tmp_path)
     monkeypatch.setattr(link, "SUMS", tmp_path / link.SUMS.name)
-    changed = tmp_path / link.shipped_file("law").name
+    changed = tmp_path / link.shipped_file("law", AVX2).name
     assert link.is_as_listed(changed)
     content = bytearray(changed.read_bytes())
     content[KEY + 100] ^= 1
