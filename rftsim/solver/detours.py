@@ -19,7 +19,18 @@ from rftsim.solver.motion import (
     twist_of,
 )
 from rftsim.solver.residual import attempt
-from rftsim.solver.steps import BUDGET, DERIVATIVE, RESERVE, keep_best, move_on, predict, try_along, worth
+from rftsim.solver.steps import (
+    BUDGET,
+    DERIVATIVE,
+    RESERVE,
+    is_misled,
+    keep_best,
+    move_on,
+    note_misfits,
+    predict,
+    try_along,
+    worth,
+)
 
 NEAR: Final = 0.25
 """Square of the share of a body's speed that is left where a step is said to pass its rest."""
@@ -63,20 +74,12 @@ def _shorten(p, crossing):
 
 
 @exact
-def _all_fresh(p):
-    """Whether all derivatives are those at the present point."""
-    fresh, found = equation.is_fresh(p), True
-    for b in range(fresh.size):
-        found = found and fresh[b] > 0.0
-    return found
-
-
-@exact
 def _arrange_other(p, crossing):
     """After a step that led nowhere: a derivative of now, beside a body's rest, less of it, or the completed one."""
     progress, now = equation.progress(p), equation.scores(p, POINT.now)
-    if not _all_fresh(p):
-        progress.is_stale, progress.shortened = 2.0, 0.0  # all of them
+    note_misfits(p)
+    if is_misled(p):
+        progress.is_stale, progress.shortened = 1.0, 0.0
         return
     alone = equation.head(p).nbody == 1 and progress.failures == 0.0
     is_asked = progress.shortened == 0.0 and not (alone and progress.rested > 0.0)
@@ -88,6 +91,7 @@ def _arrange_other(p, crossing):
         progress.rested = 1.0
         try_along(p, equation.search(p), rest, POINT.new)
         keep_best(p, POINT.new)
+        note_misfits(p)
         move_on(p)
         progress.is_stale, progress.shortened = 1.0, 0.0
     elif now.missing < 0.5 * now.scale and progress.shortened < 2.0:  # a face changes its side along the way
@@ -154,7 +158,7 @@ def _linearise_apart(p, fall):
             kept.wrench[r] = out[r]
         differentiate(p, b, kept.twist, 1.0)
         linear_algebra.copy_matrix(equation.completed(p, b), equation.derivative(p, b))
-        kept.known = 1.0
+        kept.known, kept.trend = 1.0, 0.0
     equation.work(p).evaluations += 1.0
 
 

@@ -49,10 +49,10 @@ PROGRESS: Final = np.dtype(
         )
     ]
 )
-"""State of a solution under way: whether derivatives should be taken anew, those that misled (1) or all (2); whether
-the direction comes from the completed ones, and for how many more steps; how often the direction was shortened; whether
-a body's rest was tried; how often the direction failed; iterations; factor on the tolerance; share of the direction
-that is tried; share of the missing impulse that a step leaves."""
+"""State of a solution under way: whether the derivatives should be taken anew that misled; whether the direction comes
+from the completed ones, and for how many more steps; how often the direction was shortened; whether a body's rest was
+tried; how often the direction failed; iterations; factor on the tolerance; share of the direction that is tried; share
+of the missing impulse that a step leaves."""
 
 
 class Kinds(NamedTuple):

@@ -28,7 +28,7 @@ from rftsim.solver import constraint_rows, equation, linear_algebra, residual
 from rftsim.solver.centring import centre
 from rftsim.solver.detours import is_refused
 from rftsim.solver.equation import POINT
-from rftsim.solver.motion import size_of, speed_of, twist_of
+from rftsim.solver.motion import size_of, speed_of
 from rftsim.solver.residual import allowed, attempt, copy_point
 from rftsim.solver.steps import (
     BUDGET,
@@ -38,7 +38,10 @@ from rftsim.solver.steps import (
     RESERVE,
     choose_direction,
     keep_best,
+    missed_by,
     move_on,
+    note_misfits,
+    note_trends,
     predict,
     try_along,
     worth,
@@ -136,6 +139,7 @@ def _begin(p):
     progress.contraction = KEPT_LEAVES
     predict(p)
     attempt(p, POINT.now)
+    note_trends(p)
     now, new = equation.scores(p, POINT.now), equation.scores(p, POINT.new)
     if not known:
         progress.is_stale = 1.0
@@ -176,6 +180,7 @@ def _accept(p):
     progress, now, new = equation.progress(p), equation.scores(p, POINT.now), equation.scores(p, POINT.new)
     progress.shortened = 0.0
     if progress.by_secant > 0.0:
+        note_misfits(p)
         progress.is_stale = 1.0
     else:
         left = new.missing / max(now.missing, TINY)
@@ -191,23 +196,13 @@ def _update(p, old, new):
 
     A new point within the tolerance is left by one short step more, for which the matrix that led to it will do.
     """
-    moved, twist, missed = doubles(stack_doubles(6), 6), doubles(stack_doubles(6), 6), doubles(stack_doubles(6), 6)
+    moved, missed = doubles(stack_doubles(6), 6), doubles(stack_doubles(6), 6)
     for b in range(equation.head(p).nbody):
-        twist_of(p, b, equation.velocity_of(p, new), moved)
-        twist_of(p, b, equation.velocity_of(p, old), twist)
-        length, square = equation.length(p)[b], 0.0
-        for r in range(6):
-            moved[r] -= twist[r]
-            moved[r] *= 1.0 if r < 3 else length
-            square += moved[r] * moved[r]
+        length, square = equation.length(p)[b], missed_by(p, b, old, new, moved, missed)
         if square <= 0.0:
             continue
         g = equation.derivative(p, b)
-        before, after = equation.wrench_of(p, old, b, 0), equation.wrench_of(p, new, b, 0)
         for r in range(6):
-            missed[r] = after[r] - before[r]
-            for k in range(6):
-                missed[r] -= g[r, k] * moved[k] / (1.0 if k < 3 else length)
             for k in range(6):
                 g[r, k] += missed[r] / square * (1.0 if k < 3 else length) * moved[k]
         equation.misfit(p)[b] = size_of(missed, 1.0 / length)

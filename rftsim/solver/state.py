@@ -17,11 +17,13 @@ KEPT: Final = np.dtype(
         *(("known", "f8"), ("drift", "f8"), ("parts", "f8")),
         *((name, "f8", WRENCH) for name in ("wrench", "twist", "strain")),
         ("derivative", "f8", (WRENCH, WRENCH)),
+        *(("missed", "f8", WRENCH), ("trend", "f8")),
     ]
 )
 """The sand's force on a body near where the last step ended: whether it is known; the length of the last part where
 that step was split, else zero [s], and the parts that the next one should have; the wrench that is foreseen at a
-twist that the law feels; the strain over v_c, see `newton`; the derivative of the wrench by the twist."""
+twist that the law feels; the strain over v_c, see `newton`; the derivative of the wrench by the twist; by how much
+that missed the first wrench of the last step; and the share of this that is foreseen of the next."""
 KEPT_NUMBERS: Final = numbers_in(KEPT)
 
 kept_at = record_at(KEPT)

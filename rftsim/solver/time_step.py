@@ -18,11 +18,14 @@ from rftsim.solver.newton import STRAIN, solve
 from rftsim.solver.split_step import finish, parts_needed, remember, split_step
 from rftsim.solver.state import KEPT_NUMBERS
 from rftsim.solver.step_equation import answer_to, force_to, prepare, reset
+from rftsim.solver.steps import BUDGET, worth
 
 MOST_PARTS: Final = (24.0, 1.0)
 """Parts of a step; where those did work, it is taken whole."""
 UNSOLVED_PARTS: Final = 4.0
 """Parts at least of a step that was not solved as a whole."""
+LATE: Final = 0.5
+"""Share of the evaluations' worth of a step from which on what is found is kept: there are too few for another way."""
 HUGE: Final = 1e9
 """Size from which on a force [N] or a velocity [m/s] is not taken for one."""
 GAIN: Final = 1e-7
@@ -41,7 +44,7 @@ def step(p):
         was_split = numbers.drift > 0.0
         _one_step(p, most_parts)
         work, slack = _work(p, equation.after(p)), _slack(p, allowed)
-        if work <= slack or not (was_split or numbers.drift > 0.0):
+        if work <= slack or not (was_split or numbers.drift > 0.0) or _is_late(p):
             break
         # a split step whose mean force does work: take it whole, from MuJoCo's own velocity
         _forget(p)
@@ -50,6 +53,12 @@ def step(p):
     if not _is_finite(p):
         _let_go(p)
     _keep_numbers(p)
+
+
+@exact
+def _is_late(p):
+    """Whether too few evaluations are left for another way."""
+    return worth(p) > LATE * BUDGET
 
 
 @exact
@@ -85,11 +94,20 @@ def _let_go(p):
 @exact
 def _forget(p):
     """Forget the past, and begin the step anew."""
-    equation.numbers(p).drift, equation.numbers(p).started = 0.0, 1.0
+    equation.numbers(p).started = 1.0
+    _forget_parts(p)
+    for b in range(equation.head(p).nbody):
+        equation.kept(p, b).known = 0.0
+    linear_algebra.copy(equation.first_frames(p), equation.frames(p))
+
+
+@exact
+def _forget_parts(p):
+    """Forget that a step was split: MuJoCo's velocity is the true one."""
+    equation.numbers(p).drift = 0.0
     linear_algebra.clear(equation.lacking(p))
     for b in range(equation.head(p).nbody):
-        equation.kept(p, b).known = equation.kept(p, b).drift = equation.kept(p, b).parts = 0.0
-    linear_algebra.copy(equation.first_frames(p), equation.frames(p))
+        equation.kept(p, b).drift = equation.kept(p, b).parts = 0.0
 
 
 @exact
@@ -136,6 +154,7 @@ def _take_back(p, allowed, work):
             break
         share = 0.5 if trial < 4 else 0.0
     linear_algebra.copy(answer, equation.after(p))
+    _forget_parts(p)
 
 
 @exact
@@ -150,7 +169,7 @@ def _one_step(p, most_parts):
         prepare(p, 0.5 * (drift + h))
         solve(p)
         needed = parts_needed(p, h)
-        numbers.parts = needed if numbers.solved > 0.0 else max(needed, UNSOLVED_PARTS)
+        numbers.parts = needed if numbers.solved > 0.0 else (1.0 if _is_late(p) else max(needed, UNSOLVED_PARTS))
     if numbers.parts > 1.0 and most_parts > 1:
         split_step(p, min(numbers.parts, most_parts))
         return
