@@ -40,19 +40,11 @@ with the rows that act as noted; whether `stiff_mass` has the stiffness of these
 SCORES: Final = np.dtype([("missing", "f8"), ("scale", "f8"), ("error", "f8")])
 """Scores of a tried velocity: size of the missing impulse, size of all impulses, and error of the bodies' speeds over
 what is allowed, were there no stiffness."""
-PROGRESS: Final = np.dtype(
-    [
-        (name, "f8")
-        for name in (
-            *("is_stale", "by_secant", "secants_left", "shortened", "rested", "failures"),
-            *("iteration", "loosened", "share", "contraction"),
-        )
-    ]
-)
-"""State of a solution under way: whether the derivatives should be taken anew that misled; whether the direction comes
-from the completed ones, and for how many more steps; how often the direction was shortened; whether a body's rest was
-tried; how often the direction failed; iterations; factor on the tolerance; share of the direction that is tried; share
-of the missing impulse that a step leaves."""
+_OF_PROGRESS: Final = "is_stale", "shortened", "rested", "iteration", "loosened", "share", "contraction", "enough"
+PROGRESS: Final = np.dtype([(name, "f8") for name in _OF_PROGRESS])
+"""State of a solution under way: whether the derivatives should be taken anew that misled; how often the direction was
+shortened; whether a body's rest was tried; iterations; factor on the tolerance; share of the direction that is tried;
+that of the missing impulse that a step leaves; that of all impulses up to which secants are followed next."""
 
 
 class Kinds(NamedTuple):
@@ -116,6 +108,8 @@ seen_twist, _ = _T.each("nbody", WRENCH)
 """The twist that the law last felt in that, (6,)."""
 seen_answer, _ = _T.each("nbody", AHEAD)
 """The sand's answer to it, (AHEAD,)."""
+is_hard = _T.vector("nbody")
+"""Scratch: whether secants are followed of a body, whose derivative misled, (nbody,)."""
 misfit = _T.vector("nbody")
 """Change of a body's force that its derivative did not foresee [N], (nbody,)."""
 
@@ -230,10 +224,14 @@ fixed = _T.vector("ndof")
 """Scratch: the share of it that does not come from the rows, (ndof,)."""
 search = _T.vector("ndof")
 """Scratch: the direction of a step of the solution, (ndof,)."""
+last = _T.vector("ndof")
+"""Scratch: the last velocity from which a secant was followed, (ndof,)."""
+last_step = _T.vector("ndof")
+"""Scratch: the step to where it led, (ndof,)."""
 there = _T.vector("ndof")
-"""Scratch: a velocity beside a body's rest, (ndof,)."""
+"""Scratch: a velocity that is tried, (ndof,)."""
 others = _T.vector("ndof")
-"""Scratch: the sand's generalised force on all bodies but one, (ndof,)."""
+"""Scratch: a generalised force of the sand, (ndof,)."""
 mean = _T.vector("ndof")
 """Scratch: the mean velocity of a step, (ndof,)."""
 answered = _T.vector("ndof")

@@ -21,7 +21,7 @@ EXACTNESS: Final = (1e-16, 1e-4, 1e-4)
 
 @exact
 def _derivative(p, which, b):
-    if which == COMPLETED:
+    if which == COMPLETED and equation.is_hard(p)[b] > 0.0:
         return equation.completed(p, b)
     return equation.derivative(p, b)
 
@@ -78,7 +78,7 @@ def _linearise(p, which):
         return
     for b in range(equation.head(p).nbody):
         g = _derivative(p, which, b)
-        if (which == COMPLETED or equation.kept(p, b).known > 0.0) and not _is_zero(g):
+        if equation.kept(p, b).known > 0.0 and not _is_zero(g):
             _add_derivative(p, b, g, a)
 
 

@@ -11,7 +11,7 @@ takes up the motion from step to step, up to some v_c, as sand gives way a littl
 
 The solver is Newton's method with kept derivatives of the sand (a rank-one update per body and iteration); each of its
 steps solves the constraints exactly for the sand's force linearised, which costs no evaluation. Where a step passes
-rest or the edge of a face, the next trial is at rest, or by a derivative that cannot overshoot.
+rest or the edge of a face, the next trial is at rest, or less of it, or along secants that cannot overshoot.
 
 `p` is the address of the equation's table.
 """
@@ -33,6 +33,7 @@ from rftsim.solver.residual import allowed, attempt, copy_point
 from rftsim.solver.steps import (
     BUDGET,
     DERIVATIVE,
+    ENOUGH,
     KEPT_LEAVES,
     LEAST_LEFT,
     RESERVE,
@@ -40,7 +41,6 @@ from rftsim.solver.steps import (
     keep_best,
     missed_by,
     move_on,
-    note_misfits,
     note_trends,
     predict,
     try_along,
@@ -133,10 +133,9 @@ def _begin(p):
             strain[r] = numbers.v_c * held[r]
         equation.is_fresh(p)[b] = equation.misfit(p)[b] = equation.is_seen(p)[b] = 0.0
         known = known and equation.kept(p, b).known > 0.0
-    progress.by_secant = progress.secants_left = progress.shortened = progress.rested = 0.0
-    progress.failures = progress.iteration = 0.0
+    progress.shortened = progress.rested = progress.iteration = 0.0
     progress.loosened = progress.share = 1.0
-    progress.contraction = KEPT_LEAVES
+    progress.contraction, progress.enough = KEPT_LEAVES, ENOUGH
     predict(p)
     attempt(p, POINT.now)
     note_trends(p)
@@ -157,8 +156,6 @@ def _begin(p):
 def _is_short(p):
     """Whether the direction at hand is so short that it leads to the solution, as near as is asked for."""
     numbers, progress, now = equation.numbers(p), equation.progress(p), equation.scores(p, POINT.now)
-    if progress.by_secant > 0.0:
-        return False
     if now.error <= 1.0:
         return True
     left, there, force = progress.contraction, equation.there(p), min(FORCE * numbers.tolerance, MOST_FORCE)
@@ -179,14 +176,10 @@ def _accept(p):
     """Go on from the new point."""
     progress, now, new = equation.progress(p), equation.scores(p, POINT.now), equation.scores(p, POINT.new)
     progress.shortened = 0.0
-    if progress.by_secant > 0.0:
-        note_misfits(p)
-        progress.is_stale = 1.0
-    else:
-        left = new.missing / max(now.missing, TINY)
-        progress.is_stale = 1.0 if left > 0.3 else 0.0
-        progress.contraction = min(max(left, LEAST_LEFT), 1.0)
-        _update(p, POINT.now, POINT.new)
+    left = new.missing / max(now.missing, TINY)
+    progress.is_stale = 1.0 if left > 0.3 else 0.0
+    progress.contraction = min(max(left, LEAST_LEFT), 1.0)
+    _update(p, POINT.now, POINT.new)
     move_on(p)
 
 

@@ -21,6 +21,8 @@ FRESH_LEAVES: Final = 0.1
 LEAST_LEFT: Final = 0.02
 """Share of the missing impulse that a step is thought to leave: of a kept derivative, of one that was just taken, and
 at least, where the last step showed it."""
+ENOUGH: Final = 0.05
+"""Missing impulse, over all impulses, up to which secants are followed at first."""
 STEADY: Final = 0.5
 """Share of the square of what was missed that may be left by the trend that is foreseen."""
 POOR: Final = 0.2
@@ -91,23 +93,15 @@ def _is_whole(p):
 
 @exact
 def choose_direction(p):
-    """Fill `search` with the step to the solution of the linearised equation, by the derivative that is its turn."""
-    progress, v = equation.progress(p), equation.velocity_of(p, POINT.now)
-    progress.by_secant = 1.0 if progress.secants_left > 0.0 else 0.0
-    if progress.by_secant > 0.0:
-        twist = doubles(stack_doubles(6), 6)
-        for b in range(equation.head(p).nbody):
-            felt_twist(p, b, v, twist)
-            differentiate(p, b, twist, 1.0)
-        progress.secants_left -= 1.0
-    elif progress.is_stale > 0.0:
+    """Fill `search` with the step to the solution of the linearised equation, by derivatives that did not mislead."""
+    v, search = equation.velocity_of(p, POINT.now), equation.search(p)
+    if equation.progress(p).is_stale > 0.0:
         _refresh(p)
-    which = linearised.COMPLETED if progress.by_secant > 0.0 else linearised.EXACT
-    direction = equation.search(p)
-    linearised.solution(p, v, equation.errors_of(p, POINT.now), equation.residual_of(p, POINT.now), which, direction)
+    errors, residual = equation.errors_of(p, POINT.now), equation.residual_of(p, POINT.now)
+    linearised.solution(p, v, errors, residual, linearised.EXACT, search)
     for k in range(v.size):
-        direction[k] -= v[k]
-    progress.share = 1.0
+        search[k] -= v[k]
+    equation.progress(p).share = 1.0
 
 
 @exact
@@ -165,7 +159,7 @@ def _refresh(p):
             differentiate(p, b, twist, 0.0)
             fresh[b], misfit[b], equation.kept(p, b).known = 1.0, 0.0, 1.0
     progress = equation.progress(p)
-    progress.is_stale, progress.contraction = 0.0, FRESH_LEAVES if progress.failures == 0.0 else 1.0
+    progress.is_stale, progress.contraction = 0.0, FRESH_LEAVES if progress.enough == ENOUGH else 1.0
 
 
 @exact

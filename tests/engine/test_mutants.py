@@ -113,6 +113,24 @@ def test_edits_of_what_is_sealed(force, place):
 
 
 @pytest.mark.parametrize("force", ["explicit", "implicit"])
+@pytest.mark.parametrize("edited", ["ball", "twin", None])
+def test_edits_of_one_of_two_bodies_alike(force, edited):
+    """Bodies with the same numbers read the same ones, and whosever are changed, that is NaN; else both are pressed."""
+    model = sandy(BALL + BALL.replace('"ball" pos="0', '"twin" pos="3'), force=force)
+    data = mujoco.MjData(model)
+    data.qvel[[2, 8]] = -1.0
+    bed = instances(model)[0]
+    np.testing.assert_array_equal(*bed.bodies.values())
+    if edited:
+        bed.bodies[model.body(edited).id][40] *= 1.01
+    mujoco.mj_forward(model, data)
+    assert np.isnan(data.qfrc_passive).any() == bool(edited)
+    if not edited:
+        np.testing.assert_allclose(data.qfrc_passive[:6], data.qfrc_passive[6:], rtol=1e-9, atol=1e-12)
+        assert data.qfrc_passive[2] > 1.0
+
+
+@pytest.mark.parametrize("force", ["explicit", "implicit"])
 def test_bodies_taken_from_the_plugin(force):
     """Data made before, and copies into them, go on as they did; new data and new copies are refused."""
     model = sandy(force=force)
