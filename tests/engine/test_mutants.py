@@ -123,8 +123,11 @@ def test_edits_of_one_of_two_bodies_alike(force, edited):
     np.testing.assert_array_equal(*bed.bodies.values())
     if edited:
         bed.bodies[model.body(edited).id][40] *= 1.01
-    mujoco.mj_forward(model, data)
-    assert np.isnan(data.qfrc_passive).any() == bool(edited)
+    found = False
+    for _ in range(3):  # two surfaces are more numbers than are looked at in one go
+        mujoco.mj_forward(model, data)
+        found = found or np.isnan(data.qfrc_passive).any()
+    assert found == bool(edited)
     if not edited:
         np.testing.assert_allclose(data.qfrc_passive[:6], data.qfrc_passive[6:], rtol=1e-9, atol=1e-12)
         assert data.qfrc_passive[2] > 1.0
