@@ -10,22 +10,38 @@ from rftsim.solver import constraint_rows, equation, linear_algebra, residual, s
 from rftsim.solver.equation import POINT
 from rftsim.solver.motion import (
     add_wrench,
+    differentiate,
     felt_twist,
     generalised,
+    respond,
+    size_of,
+    speed_of,
     twist_of,
 )
+from rftsim.solver.residual import attempt
 from rftsim.solver.steps import (
+    BUDGET,
+    DERIVATIVE,
+    RESERVE,
     is_misled,
     keep_best,
     move_on,
     note_misfits,
+    predict,
     try_along,
+    worth,
 )
 
 NEAR: Final = 0.25
 """Square of the share of a body's speed that is left where a step is said to pass its rest."""
 BESIDE: Final = 0.3
 """Speed, over v_c, at which a body is tried beside its rest."""
+MOST_EASED: Final = 2.0
+"""How often a body that is alone comes to its equation by way of smoother ones."""
+STAGES: Final = 4
+"""Stages of that, after the first."""
+SLIDES: Final = 4.0
+"""Speed over v_c from which on a body slides on, whatever v_c is."""
 LEAST: Final = 0.01
 """Least missing impulse, over all impulses, up to which secants are followed."""
 
@@ -62,7 +78,7 @@ def _arrange_other(p, crossing):
     if is_misled(p):
         progress.is_stale, progress.shortened = 1.0, 0.0
         return
-    is_asked = progress.shortened == 0.0 and progress.rested == 0.0
+    is_asked, is_alone = progress.shortened == 0.0 and progress.rested == 0.0, equation.head(p).nbody == 1
     rest = _rest_along(p, equation.search(p), progress.share) if is_asked else 0.0
     if rest > 0.0:
         progress.rested = 1.0
@@ -70,15 +86,73 @@ def _arrange_other(p, crossing):
         keep_best(p, POINT.new)
         note_misfits(p)
         move_on(p)
-    elif now.missing < 0.5 * now.scale and progress.shortened < 2.0:  # a face changes its side along the way
-        _shorten(p, crossing)
+    elif now.missing < 0.5 * now.scale and progress.shortened < 2.0 and not (is_alone and progress.eased == 0.0):
+        _shorten(p, crossing)  # a face changes its side along the way
         return
+    elif is_alone and progress.eased < MOST_EASED:
+        progress.eased += 1.0
+        _ease(p)
     else:
         secants.follow(p, progress.enough)
         progress.enough = max(0.3 * progress.enough, LEAST)
-        linear_algebra.clear(equation.is_fresh(p))
+    linear_algebra.clear(equation.is_fresh(p))
+    if rest <= 0.0:
         linear_algebra.clear(equation.misfit(p))
     progress.is_stale, progress.shortened = 1.0, 0.0
+
+
+@exact
+def _ease(p):
+    """Come to the equation by way of smoother ones, where a step of Newton's method leads nowhere.
+
+    At first v_c is as large as the speeds, and falls stage by stage to what it is. A body that the sand holds creeps
+    at a speed that goes with v_c, so it is foreseen to slow down as v_c falls; the completed derivative is exact for
+    that, and does not overshoot for bodies that slide on.
+    """
+    numbers = equation.numbers(p)
+    sharp, soft = numbers.v_c, _softest(p)
+    fall = (soft / sharp) ** (1.0 / STAGES)
+    for stage in range(STAGES + 1):
+        if worth(p) > BUDGET - RESERVE - 2.0 * DERIVATIVE:
+            break
+        numbers.v_c = soft if stage == 0 else numbers.v_c / fall
+        _linearise_apart(p, 1.0 if stage == 0 else fall)
+        predict(p)
+    numbers.v_c = sharp
+    linear_algebra.clear(equation.is_seen(p))
+    attempt(p, POINT.now)
+    keep_best(p, POINT.now)
+
+
+@exact
+def _softest(p):
+    """The largest speed of a body, or that to which it is driven within the step [m/s]."""
+    numbers, v, driven = equation.numbers(p), equation.velocity_of(p, POINT.now), equation.driven(p)
+    soft = numbers.v_c
+    for b in range(equation.head(p).nbody):
+        speed = max(speed_of(p, b, equation.start(p)), speed_of(p, b, v))
+        soft = max(soft, max(speed, speed_of(p, b, driven)))
+    return soft
+
+
+@exact
+def _linearise_apart(p, fall):
+    """Take each body's force and its derivative at the present point, slowed down by `fall` where the sand holds it."""
+    numbers, v, out = equation.numbers(p), equation.velocity_of(p, POINT.now), equation.answer_of(p, POINT.spare, 0)
+    for b in range(equation.head(p).nbody):
+        kept = equation.kept(p, b)
+        felt_twist(p, b, v, kept.twist)
+        speed = size_of(kept.twist, equation.length(p)[b]) / (SLIDES * fall * numbers.v_c)
+        slowed = min(max(speed * speed, 1.0 / fall), 1.0)
+        for r in range(6):
+            kept.twist[r] *= slowed
+        respond(p, b, kept.twist, out)
+        for r in range(6):
+            kept.wrench[r] = out[r]
+        differentiate(p, b, kept.twist, 1.0)
+        linear_algebra.copy_matrix(equation.completed(p, b), equation.derivative(p, b))
+        kept.known, kept.trend = 1.0, 0.0
+    equation.work(p).evaluations += 1.0
 
 
 @exact

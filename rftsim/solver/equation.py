@@ -40,11 +40,12 @@ with the rows that act as noted; whether `stiff_mass` has the stiffness of these
 SCORES: Final = np.dtype([("missing", "f8"), ("scale", "f8"), ("error", "f8")])
 """Scores of a tried velocity: size of the missing impulse, size of all impulses, and error of the bodies' speeds over
 what is allowed, were there no stiffness."""
-_OF_PROGRESS: Final = "is_stale", "shortened", "rested", "iteration", "loosened", "share", "contraction", "enough"
-PROGRESS: Final = np.dtype([(name, "f8") for name in _OF_PROGRESS])
+_OF_PROGRESS: Final = ("is_stale", "shortened", "rested", "eased", "iteration", "loosened")
+PROGRESS: Final = np.dtype([(name, "f8") for name in (*_OF_PROGRESS, "share", "contraction", "enough")])
 """State of a solution under way: whether the derivatives should be taken anew that misled; how often the direction was
-shortened; whether a body's rest was tried; iterations; factor on the tolerance; share of the direction that is tried;
-that of the missing impulse that a step leaves; that of all impulses up to which secants are followed next."""
+shortened; whether a body's rest was tried; how often the equation was eased; iterations; factor on the tolerance; share
+of the direction that is tried; that of the missing impulse that a step leaves; that of all impulses up to which secants
+are followed next."""
 
 
 class Kinds(NamedTuple):

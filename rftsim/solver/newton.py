@@ -133,7 +133,7 @@ def _begin(p):
             strain[r] = numbers.v_c * held[r]
         equation.is_fresh(p)[b] = equation.misfit(p)[b] = equation.is_seen(p)[b] = 0.0
         known = known and equation.kept(p, b).known > 0.0
-    progress.shortened = progress.rested = progress.iteration = 0.0
+    progress.shortened = progress.rested = progress.eased = progress.iteration = 0.0
     progress.loosened = progress.share = 1.0
     progress.contraction, progress.enough = KEPT_LEAVES, ENOUGH
     predict(p)
