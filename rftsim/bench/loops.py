@@ -8,7 +8,12 @@ from rftsim.law.body import body_at, frame_over, header_at, medium_of
 from rftsim.law.grounds import plane
 from rftsim.law.laws import CUBIC
 from rftsim.law.leading import SHARP, Edge
+from rftsim.machine import link
+from rftsim.machine.targets import TARGETS
 
+_AS_SHIPPED = next(filter(link.runs, TARGETS["law"]), None)
+if _AS_SHIPPED:  # nothing here is compiled for wider or narrower vectors than the law is
+    numba.config.CPU_NAME, numba.config.CPU_FEATURES = _AS_SHIPPED.name, _AS_SHIPPED.tuned
 laws.linked()("rftsim_wrench")  # by which name compiled code finds it from here on
 _sums = sums.sums(CUBIC, plane(CUBIC))
 
