@@ -3,7 +3,7 @@
 #include <math.h>
 
 enum { X, Y, Z, NX, NY, NZ, AREA, COLUMNS };    /* centre, normal, area: a column each, n or CAPACITY apart */
-enum { LOOK = 128, CAPACITY = 392, LANES = 4 }; /* as in rftsim/law/selection.py */
+enum { LOOK = 128, CAPACITY = 392, LANES = 4 }; /* as rftsim.law.selection for AVX2 */
 
 typedef struct {
   double xi, mu, height, reach2, v[3], w[3], table[60];

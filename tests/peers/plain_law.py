@@ -2,7 +2,7 @@
 
 Two variants of it, one that evaluates every triangle and one that first chooses those in the sand that lead, as ours
 does, are timed in turn with ours on buried spheres, as `rftsim bench kernel` does, and their wrenches compared. Ours
-is made for x86-64-v3; on a processor that knows more, `-march=x86-64-v3` gives the C the same instructions.
+is made for the levels of `rftsim.machine.targets`, as `-march=x86-64-v4` or `-march=x86-64-v3` makes the C.
 """
 
 import ctypes
