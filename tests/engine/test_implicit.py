@@ -271,7 +271,7 @@ def test_capacity_of_the_legs():
 def test_steady_motion_takes_one_evaluation_a_step():
     """A paddle that a servo turns through sand: what the first guess misses in a step goes on in the next.
 
-    Without that trend the force is evaluated 1.4 times a step, as normals turn and faces come into the sand.
+    Without that trend the force is evaluated 1.5 times a step, as normals turn and faces come into the sand.
     """
     spec = mujoco.MjSpec.from_string(PADDLE)
     rftsim.add_sand(spec, bodies=["paddle"], reduction=0.0, max_edge=0.01)
