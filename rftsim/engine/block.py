@@ -53,8 +53,8 @@ MEMBER: Final = np.dtype(
     ]
 )
 """A body's id; its surface's place in numeric_data, and that of the first one with the same numbers, which is read in
-its stead, as it is at hand; how many numbers it has; how many were looked at since their
-weight was last compared; their weight and that of the header; that of those looked at; what the size follows from."""
+its stead, as it is at hand; how many numbers it has; how many were looked at since their weight was last compared;
+their weight and that of the header; that of those looked at; what the size follows from."""
 COUNTERS: Final = np.dtype(
     [
         *((name, "f8") for name in ("evaluations", "derivatives", "unsolved")),

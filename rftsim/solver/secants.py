@@ -15,7 +15,7 @@ from rftsim.solver import constraint_rows, equation, linear_algebra, linearised,
 from rftsim.solver.equation import POINT
 from rftsim.solver.motion import differentiate, felt_twist
 from rftsim.solver.residual import attempt, copy_point
-from rftsim.solver.steps import BUDGET, DERIVATIVE, POOR, RESERVE, keep_best, note_misfits, worth
+from rftsim.solver.steps import BUDGET, DERIVATIVE, RESERVE, keep_best, note_misfits, poor_misfit, worth
 
 WORSE: Final = 1.5
 """Factor on the missing impulse, over all impulses, up to which an extrapolated step is taken."""
@@ -41,12 +41,10 @@ def follow(p, enough):
 @exact
 def _note_hard(p):
     """Note of which bodies secants are followed: those whose derivatives miss their forces worst at the new point."""
-    misfit, hard, largest = equation.misfit(p), equation.is_hard(p), 0.0
     note_misfits(p)
+    misfit, hard, poor = equation.misfit(p), equation.is_hard(p), poor_misfit(p)
     for b in range(misfit.size):
-        largest = max(largest, misfit[b])
-    for b in range(misfit.size):
-        hard[b] = 1.0 if misfit[b] >= POOR * largest else hard[b]
+        hard[b] = 1.0 if misfit[b] >= poor else hard[b]
 
 
 @exact

@@ -135,13 +135,20 @@ def note_misfits(p):
 
 
 @exact
+def poor_misfit(p):
+    """The misfit from which on a body's derivative is said to have missed its force by far [N]."""
+    misfit, largest = equation.misfit(p), 0.0
+    for b in range(misfit.size):
+        largest = max(largest, misfit[b])
+    return POOR * largest
+
+
+@exact
 def is_misled(p):
     """Whether a derivative missed a force by far that is not that at the present point."""
-    misfit, fresh, largest, found = equation.misfit(p), equation.is_fresh(p), 0.0, False
+    misfit, fresh, poor, found = equation.misfit(p), equation.is_fresh(p), poor_misfit(p), False
     for b in range(fresh.size):
-        largest = max(largest, misfit[b])
-    for b in range(fresh.size):
-        found = found or (fresh[b] == 0.0 and misfit[b] >= POOR * largest)
+        found = found or (fresh[b] == 0.0 and misfit[b] >= poor)
     return found
 
 

@@ -169,7 +169,9 @@ def _one_step(p, most_parts):
         prepare(p, 0.5 * (drift + h))
         solve(p)
         needed = parts_needed(p, h)
-        numbers.parts = needed if numbers.solved > 0.0 else (1.0 if _is_late(p) else max(needed, UNSOLVED_PARTS))
+        if numbers.solved == 0.0:
+            needed = 1.0 if _is_late(p) else max(needed, UNSOLVED_PARTS)
+        numbers.parts = needed
     if numbers.parts > 1.0 and most_parts > 1:
         split_step(p, min(numbers.parts, most_parts))
         return
