@@ -56,7 +56,7 @@ def _complete(p):
     for b in range(equation.head(p).nbody):
         felt_twist(p, b, equation.velocity_of(p, POINT.best), twist)
         differentiate(p, b, twist, 1.0)
-        linear_algebra.copy_matrix(equation.completed(p, b), equation.derivative(p, b))
+        linear_algebra.copy_matrix(equation.secant(p, b), equation.derivative(p, b))
         equation.kept(p, b).known = 1.0
 
 

@@ -36,10 +36,11 @@ NEAR: Final = 0.25
 """Square of the share of a body's speed that is left where a step is said to pass its rest."""
 BESIDE: Final = 0.3
 """Speed, over v_c, at which a body is tried beside its rest."""
-MOST_EASED: Final = 2.0
-"""How often a body that is alone comes to its equation by way of smoother ones."""
+CLOSE: Final = (0.5, 0.1)
+"""Missing impulse, over all impulses, up to which a body's rest is tried, or less of a step: of a body that is alone,
+and of several."""
 STAGES: Final = 4
-"""Stages of that, after the first."""
+"""Stages, after the first, in which a body that is alone comes to its equation by way of smoother ones."""
 SLIDES: Final = 4.0
 """Speed over v_c from which on a body slides on, whatever v_c is."""
 LEAST: Final = 0.01
@@ -78,7 +79,9 @@ def _arrange_other(p, crossing):
     if is_misled(p):
         progress.is_stale, progress.shortened = 1.0, 0.0
         return
-    is_asked, is_alone = progress.shortened == 0.0 and progress.rested == 0.0, equation.head(p).nbody == 1
+    is_alone = equation.head(p).nbody == 1
+    is_close = now.missing < (CLOSE[0] if is_alone else CLOSE[1]) * now.scale
+    is_asked = is_close and progress.shortened == 0.0 and progress.rested == 0.0
     rest = _rest_along(p, equation.search(p), progress.share) if is_asked else 0.0
     if rest > 0.0:
         progress.rested = 1.0
@@ -86,18 +89,16 @@ def _arrange_other(p, crossing):
         keep_best(p, POINT.new)
         note_misfits(p)
         move_on(p)
-    elif now.missing < 0.5 * now.scale and progress.shortened < 2.0 and not (is_alone and progress.eased == 0.0):
+    elif is_close and progress.shortened < 2.0 and not (is_alone and progress.eased == 0.0):
         _shorten(p, crossing)  # a face changes its side along the way
         return
-    elif is_alone and progress.eased < MOST_EASED:
-        progress.eased += 1.0
+    elif is_alone and progress.eased == 0.0:
+        progress.eased = 1.0
         _ease(p)
     else:
         secants.follow(p, progress.enough)
         progress.enough = max(0.3 * progress.enough, LEAST)
     linear_algebra.clear(equation.is_fresh(p))
-    if rest <= 0.0:
-        linear_algebra.clear(equation.misfit(p))
     progress.is_stale, progress.shortened = 1.0, 0.0
 
 
@@ -120,6 +121,7 @@ def _ease(p):
         predict(p)
     numbers.v_c = sharp
     linear_algebra.clear(equation.is_seen(p))
+    linear_algebra.clear(equation.misfit(p))
     attempt(p, POINT.now)
     keep_best(p, POINT.now)
 
@@ -150,7 +152,7 @@ def _linearise_apart(p, fall):
         for r in range(6):
             kept.wrench[r] = out[r]
         differentiate(p, b, kept.twist, 1.0)
-        linear_algebra.copy_matrix(equation.completed(p, b), equation.derivative(p, b))
+        linear_algebra.copy_matrix(equation.secant(p, b), equation.derivative(p, b))
         kept.known, kept.trend = 1.0, 0.0
     equation.work(p).evaluations += 1.0
 

@@ -38,12 +38,11 @@ triangle's stress falls to zero [m/s]; whether the equation was solved; length o
 parts that are needed; whether `linear` is that of the derivatives as they are, and `linear_factors` are its factors
 with the rows that act as noted; whether `stiff_mass` has the stiffness of these."""
 SCORES: Final = np.dtype([("missing", "f8"), ("scale", "f8"), ("error", "f8")])
-"""Scores of a tried velocity: size of the missing impulse, size of all impulses, and error of the bodies' speeds over
-what is allowed, were there no stiffness."""
+"""Scores of a tried velocity: sizes of the missing impulse and of all; speeds' error over what is allowed, unstiff."""
 _OF_PROGRESS: Final = ("is_stale", "shortened", "rested", "eased", "iteration", "loosened")
 PROGRESS: Final = np.dtype([(name, "f8") for name in (*_OF_PROGRESS, "share", "contraction", "enough")])
 """State of a solution under way: whether the derivatives should be taken anew that misled; how often the direction was
-shortened; whether a body's rest was tried; how often the equation was eased; iterations; factor on the tolerance; share
+shortened; whether a body's rest was tried; whether the equation was eased; iterations; factor on the tolerance; share
 of the direction that is tried; that of the missing impulse that a step leaves; that of all impulses up to which secants
 are followed next."""
 
@@ -116,8 +115,7 @@ misfit = _T.vector("nbody")
 
 # Constraint rows, of which one at an acceleration a gives the force -D (J a - aref), limited by kind.
 row_path = _T.vectors("ndof", "nrow", view=int64s)
-"""The degrees of freedom that a row depends on, rising, int64, of which `row_length` count; the same for all rows of
-an elliptic contact."""
+"""The degrees of freedom of a row, rising, int64, of which `row_length` count; all rows of a cone have the same."""
 row_length = _T.vector("nrow", view=int64s)
 """Number of them, int64, (nrow,)."""
 row_jacobian = _T.vectors("ndof", "nrow")
@@ -178,8 +176,12 @@ driven = _T.vector("ndof")
 # Its solution.
 progress = _T.record(PROGRESS)
 """Record PROGRESS of the solution."""
-completed, _ = _T.each("nbody", 6, 6)
+secant, _ = _T.each("nbody", 6, 6)
 """Derivative of a body's wrench by its twist that does not overshoot, (6, 6)."""
+pace = _T.vector("nbody")
+"""Scratch: `motion.pace_of` the twist where a body's secant is from, zero where there is none, (nbody,)."""
+slope, _ = _T.each("nbody", 6, 6)
+"""Scratch: derivative of the wrench that a body's secant tells, or that secant at another pace, (6, 6)."""
 velocity_of = _T.vectors("ndof", _POINTS)
 """Generalised velocity of a point, (ndof,)."""
 residual_of = _T.vectors("ndof", _POINTS)
@@ -230,7 +232,7 @@ last = _T.vector("ndof")
 last_step = _T.vector("ndof")
 """Scratch: the step to where it led, (ndof,)."""
 there = _T.vector("ndof")
-"""Scratch: a velocity that is tried, (ndof,)."""
+"""Scratch: a velocity that is tried, or a change of one, (ndof,)."""
 others = _T.vector("ndof")
 """Scratch: a generalised force of the sand, (ndof,)."""
 mean = _T.vector("ndof")

@@ -11,8 +11,8 @@ from rftsim.solver import constraint_rows, equation, linear_algebra, matrices
 
 NONE: Final = 0
 EXACT: Final = 1
-COMPLETED: Final = 2
-"""Which derivative of the sand's force the linearised equation takes."""
+TOLD: Final = 2
+"""Which derivative of the sand's force the linearised equation takes; TOLD: of hard bodies that in `equation.slope`."""
 ITERATIONS: Final = 20
 """Steps of Newton's method on the rows, and trials of one step's length, at most."""
 EXACTNESS: Final = (1e-16, 1e-4, 1e-4)
@@ -21,8 +21,8 @@ EXACTNESS: Final = (1e-16, 1e-4, 1e-4)
 
 @exact
 def _derivative(p, which, b):
-    if which == COMPLETED and equation.is_hard(p)[b] > 0.0:
-        return equation.completed(p, b)
+    if which == TOLD and equation.is_hard(p)[b] > 0.0:
+        return equation.slope(p, b)
     return equation.derivative(p, b)
 
 

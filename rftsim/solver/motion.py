@@ -45,6 +45,22 @@ def size_of(twist, length):
 
 
 @exact
+def pace_of(p, b, twist):
+    """The root of the squares of body b's velocity, of its angular velocity times its length, and of v_c [m/s]."""
+    u, w, length, v_c = twist[:3], twist[3:], equation.length(p)[b], equation.numbers(p).v_c
+    return np.sqrt(linear_algebra.dot(u, u) + length * length * linear_algebra.dot(w, w) + v_c * v_c)
+
+
+@exact
+def told(p, b, twist, out):
+    """Fill out with the wrench that the secant of body b tells at a twist, see `secants`, (6,)."""
+    share = equation.pace(p)[b] / pace_of(p, b, twist)
+    linear_algebra.multiply(equation.secant(p, b), twist, out)
+    for r in range(6):
+        out[r] *= share
+
+
+@exact
 def speed_of(p, b, v):
     """The size of body b's twist at a generalised velocity [m/s]."""
     twist = doubles(stack_doubles(6), 6)
@@ -103,14 +119,13 @@ def evaluate(p, v, k):
 
 @exact
 def _is_foreseen(p, b, twist, out):
-    """Whether a twist of body b hardly differs from the last evaluated one; then out is filled by the derivative."""
+    """Whether a twist of body b hardly differs from the last evaluated one; then out is filled, see `_fill_change`."""
     change, wrench, known = doubles(stack_doubles(6), 6), doubles(stack_doubles(6), 6), equation.seen_twist(p, b)
     for r in range(6):
         change[r] = twist[r] - known[r]
     length = equation.length(p)[b]
-    if equation.kept(p, b).known == 0.0 or size_of(change, length) > ALIKE * allowed_at(p, size_of(twist, length)):
+    if size_of(change, length) > ALIKE * allowed_at(p, size_of(twist, length)) or not _fill_change(p, b, twist, wrench):
         return False
-    linear_algebra.multiply(equation.derivative(p, b), change, wrench)
     most = equation.numbers(p).tolerance * size_of(equation.seen_answer(p, b)[:WRENCH], 1.0 / length)
     if not size_of(wrench, 1.0 / length) <= most:  # at rest the force jumps, and a derivative is that of elsewhere
         return False
@@ -119,6 +134,24 @@ def _is_foreseen(p, b, twist, out):
         out[r] += wrench[r]
         out[WRENCH + r] += wrench[r]
     return True
+
+
+@exact
+def _fill_change(p, b, twist, out):
+    """Fill out with the change of body b's wrench since it was evaluated, if a derivative or secant tells it."""
+    change, known = doubles(stack_doubles(6), 6), equation.seen_twist(p, b)
+    if equation.is_hard(p)[b] > 0.0:
+        if equation.pace(p)[b] == 0.0:
+            return False
+        told(p, b, twist, out)
+        told(p, b, known, change)
+        for r in range(6):
+            out[r] -= change[r]
+        return True
+    for r in range(6):
+        change[r] = twist[r] - known[r]
+    linear_algebra.multiply(equation.derivative(p, b), change, out)
+    return equation.kept(p, b).known > 0.0
 
 
 @exact
@@ -132,7 +165,7 @@ def differentiate(p, b, twist, completed):
     """Evaluate the derivative of body b's wrench by its twist: the exact one (0.0), or the completed one (1.0)."""
     sand, numbers, f, r = equation.head(p).sand, equation.numbers(p), equation.frame(p, b), equation.rotation(p, b)
     fixed = equation.surface(p)[b], f.ctypes.data, r.ctypes.data
-    g = equation.completed(p, b).ctypes.data if completed > 0.0 else equation.derivative(p, b).ctypes.data
+    g = equation.secant(p, b).ctypes.data if completed > 0.0 else equation.derivative(p, b).ctypes.data
     numbers.is_linearised = 0.0
     exports.derivative(sand, *fixed, twist.ctypes.data, numbers.v_c, completed, g)
     equation.work(p).derivatives += 1.0 / equation.head(p).nbody

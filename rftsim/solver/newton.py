@@ -131,7 +131,7 @@ def _begin(p):
         strain, held = equation.strain(p, b), equation.kept(p, b).strain
         for r in range(6):
             strain[r] = numbers.v_c * held[r]
-        equation.is_fresh(p)[b] = equation.misfit(p)[b] = equation.is_seen(p)[b] = 0.0
+        equation.is_fresh(p)[b] = equation.misfit(p)[b] = equation.is_seen(p)[b] = equation.is_hard(p)[b] = 0.0
         known = known and equation.kept(p, b).known > 0.0
     progress.shortened = progress.rested = progress.eased = progress.iteration = 0.0
     progress.loosened = progress.share = 1.0
