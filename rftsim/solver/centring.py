@@ -16,28 +16,22 @@ CURVED: Final = 10.0
 
 @exact
 def centre(p, accepted):
-    """Fill `end`: one step of Newton's method from the best point, without an evaluation.
+    """Fill `end`: one step on from the best point, without an evaluation.
 
-    It is corrected to first order for the force at the step's mean velocity instead of its end. What is stiff against
-    the mass is left out of that, by M A^-1: a body that stops in the step stays stopped.
+    A step of Newton's method is corrected to first order for the force at the time step's mean velocity instead of its
+    end. What is stiff against the mass is left out of that, by M A^-1: a body that stops in the step stays stopped.
 
     Args:
         p: The equation.
-        accepted: Whether `search` holds that step already.
+        accepted: Whether that is the step of Newton's method in `search`; else it goes along secants.
     """
     v, start, end, mean = equation.velocity_of(p, POINT.best), equation.start(p), equation.end(p), equation.mean(p)
-    errors = equation.errors_of(p, POINT.best)
-    if accepted:
-        for k in range(v.size):
-            end[k] = v[k] + equation.search(p)[k]
-        _follow(p)
-    elif equation.numbers(p).solved == 0.0:  # a step by what cannot overshoot, so that no body is kicked
-        _complete(p)
-        linearised.solution(p, v, errors, equation.residual_of(p, POINT.best), linearised.EXACT, end)
-        _follow(p)
+    if not accepted:
+        _brake(p)
         return
-    else:
-        linearised.solution(p, v, errors, equation.residual_of(p, POINT.best), linearised.EXACT, end)
+    for k in range(v.size):
+        end[k] = v[k] + equation.search(p)[k]
+    _follow(p)
     for k in range(v.size):
         mean[k] = end[k] - start[k]
     if _largest(p, mean, end) <= 2.0:
@@ -50,14 +44,20 @@ def centre(p, accepted):
 
 
 @exact
-def _complete(p):
-    """Take the completed derivatives at the best point for the bodies' derivatives."""
-    twist = doubles(stack_doubles(6), 6)
+def _brake(p):
+    """Fill `end` with a step from the best point along the bodies' secants, which become their derivatives.
+
+    It cannot overshoot: a step of Newton's method that nothing has checked kicks bodies that have all but stopped.
+    """
+    v, twist = equation.velocity_of(p, POINT.best), doubles(stack_doubles(6), 6)
     for b in range(equation.head(p).nbody):
-        felt_twist(p, b, equation.velocity_of(p, POINT.best), twist)
+        felt_twist(p, b, v, twist)
         differentiate(p, b, twist, 1.0)
         linear_algebra.copy_matrix(equation.secant(p, b), equation.derivative(p, b))
         equation.kept(p, b).known = 1.0
+    errors, missing = equation.errors_of(p, POINT.best), equation.residual_of(p, POINT.best)
+    linearised.solution(p, v, errors, missing, linearised.EXACT, equation.end(p))
+    _follow(p)
 
 
 @exact

@@ -39,7 +39,7 @@ BESIDE: Final = 0.3
 CLOSE: Final = (0.5, 0.1)
 """Missing impulse, over all impulses, up to which a body's rest is tried, or less of a step: of a body that is alone,
 and of several."""
-STAGES: Final = 4
+STAGES: Final = 2
 """Stages, after the first, in which a body that is alone comes to its equation by way of smoother ones."""
 SLIDES: Final = 4.0
 """Speed over v_c from which on a body slides on, whatever v_c is."""
@@ -95,6 +95,7 @@ def _arrange_other(p, crossing):
     elif is_alone and progress.eased == 0.0:
         progress.eased = 1.0
         _ease(p)
+        secants.follow(p, progress.enough)
     else:
         secants.follow(p, progress.enough)
         progress.enough = max(0.3 * progress.enough, LEAST)
