@@ -16,7 +16,7 @@ from rftsim.law.grounds import ALL_COLUMNS, Ground
 from rftsim.law.laws import Response
 from rftsim.law.layout import BLOCK, COLUMN
 from rftsim.law.leading import Edge
-from rftsim.law.selection import CAPACITY, LOOK, choosing, chosen_on_stack, filled_up
+from rftsim.law.selection import CAPACITY, FULL, choosing, chosen_on_stack, filled_up
 from rftsim.law.stress import TINY
 from rftsim.law.vectors import larger, smaller
 from rftsim.machine.compiling import loop, merged
@@ -164,7 +164,7 @@ def derivative(response: Response, ground: Ground) -> Any:
         reach = leading.ALL if completed > 0.0 else leading.reach2(edge)
         while last < body.count:
             n, last = choose(body, last, frame, 0.0, reach, 0.0, chosen, n)
-            if n > CAPACITY - LOOK or last >= body.count:
+            if n > FULL or last >= body.count:
                 n = filled_up(chosen, n)
                 ground.settle(chosen, CAPACITY, n, frame, field)
                 add_chosen(chosen, n, frame, medium, edge, v_c, completed, out)

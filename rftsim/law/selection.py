@@ -18,13 +18,15 @@ from rftsim.law.layout import BLOCK, COLUMN, COLUMNS
 from rftsim.law.leading import may_lead
 from rftsim.law.vectors import larger, smaller
 from rftsim.machine.compiling import inline, inline_loop
-from rftsim.machine.lanes import WIDE
+from rftsim.machine.lanes import LANES, WIDE, picking
 from rftsim.machine.memory import on_stack, peek, poke
 
 LOOK: Final = 4 * BLOCK
 """Triangles that are looked at together, at most."""
 CAPACITY: Final = 392
 """Triangles that are evaluated together at most; no power of two, lest the columns share the cache's sets."""
+FULL: Final = CAPACITY - LOOK - WIDE
+"""Triangles above which these are evaluated before more are looked at."""
 
 _columns, _scores = on_stack(ALL_COLUMNS * CAPACITY, types.float64), on_stack(LOOK, types.float64)
 _indices = on_stack(LOOK, types.int64)
@@ -83,6 +85,32 @@ def filled_up(chosen, n):
     return n
 
 
+@inline_loop
+def _picked_one_by_one(body, first, count, scores, chosen, n):
+    """Copy behind the first n those of so many triangles, from one on, whose scores are not negative; how many then."""
+    indices, found = carray(_indices(), (LOOK,)), 0
+    for i in range(count):
+        poke(indices, found, i)
+        found += 0 if peek(scores, i) < 0.0 else 1  # what is no number counts, and stays none
+    for i in range(found):
+        k, to = first + peek(indices, i), n + i
+        for column in range(COLUMNS):
+            poke(chosen, to + column * CAPACITY, bodies.at(body, column, k))
+    return n + found
+
+
+_pick = picking(COLUMNS, CAPACITY)
+
+
+@inline_loop
+def _picked_at_once(body, first, count, scores, chosen, n):
+    """The same, for processors that press together what is chosen of a vector."""
+    return _pick(scores, count, body.numbers, first, body.count, chosen, n)
+
+
+_picked = _picked_at_once if WIDE > LANES else _picked_one_by_one
+
+
 def choosing(response: Response, ahead: bool) -> Any:
     """Make the function that chooses what leads in the sand under a response; ahead: or in that after a time h."""
     normal_speed = response.normal_speed
@@ -104,18 +132,10 @@ def choosing(response: Response, ahead: bool) -> Any:
             How many are chosen then, and behind which triangle to go on.
         """
         first, last = next_run(body, start, frame, margin)
-        scores, indices = carray(_scores(), (LOOK,)), carray(_indices(), (LOOK,))
+        scores = carray(_scores(), (LOOK,))
         for i in range(last - first):
             x, y, z = bodies.centre(body, first + i)
             poke(scores, i, score(x, y, z, bodies.normal(body, first + i), frame, reach2, h))
-        found = 0
-        for i in range(last - first):
-            poke(indices, found, i)
-            found += 0 if peek(scores, i) < 0.0 else 1  # what is no number counts, and stays none
-        for i in range(found):
-            k, to = first + peek(indices, i), n + i
-            for column in range(COLUMNS):
-                poke(chosen, to + column * CAPACITY, bodies.at(body, column, k))
-        return n + found, last
+        return _picked(body, first, last - first, scores, chosen, n), last
 
     return choose

@@ -15,7 +15,7 @@ from rftsim.law.grounds import Ground
 from rftsim.law.laws import Response
 from rftsim.law.layout import PRESSED
 from rftsim.law.leading import reach2
-from rftsim.law.selection import CAPACITY, LOOK, area, centre, choosing, chosen_on_stack, filled_up, normal
+from rftsim.law.selection import CAPACITY, FULL, area, centre, choosing, chosen_on_stack, filled_up, normal
 from rftsim.law.stress import TINY
 from rftsim.law.vectors import larger
 from rftsim.machine.compiling import inline, inline_loop, merged
@@ -81,7 +81,7 @@ def sums(response: Response, ground: Ground) -> Any:
         field = ground.field(sand)
         while last < body.count:
             n, last = choose(body, last, frame, 0.0, reach, 0.0, chosen, n)
-            if n > CAPACITY - LOOK or last >= body.count:
+            if n > FULL or last >= body.count:
                 n = filled_up(chosen, n)
                 ground.settle(chosen, CAPACITY, n, frame, field)
                 total, n = add(chosen, n, frame, medium, edge, total), 0
@@ -128,7 +128,7 @@ def sums_ahead(response: Response, ground: Ground) -> Any:
         now, after, volumes = _nothing(), _nothing(), (0.0, 0.0)
         while last < body.count:
             n, last = choose(body, last, frame, margin, reach, h, chosen, n)
-            if n > CAPACITY - LOOK or last >= body.count:
+            if n > FULL or last >= body.count:
                 n = filled_up(chosen, n)
                 ground.settle(chosen, CAPACITY, n, frame, field)
                 now, after, volumes = add(chosen, n, frame, medium, edge, v_c, h, now, after, volumes)
@@ -167,7 +167,7 @@ def pressures(response: Response, ground: Ground) -> Any:
         count, total = 0, _nothing()
         while last < body.count:
             n, last = choose(body, last, frame, 0.0, reach, 0.0, chosen, n)
-            if n > CAPACITY - LOOK or last >= body.count:
+            if n > FULL or last >= body.count:
                 ground.settle(chosen, CAPACITY, n, frame, field)
                 total = add(chosen, n, frame, medium, edge, v_c, out[count:], total)
                 count, n = count + n, 0

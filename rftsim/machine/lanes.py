@@ -123,3 +123,55 @@ def gather(typing_context: Any, places: Any, shares: Any, sixes: Any, count: Any
             store(builder, builder.load(total), target, start)
 
     return types.void(places, shares, sixes, types.intp, out), generate
+
+
+def picking(columns: int, stride: int) -> Any:
+    """Make what copies those places of columns whose scores are not negative; out's columns are a stride apart."""
+    flags, word = ir.VectorType(ir.IntType(1), WIDE), ir.IntType(WIDE)
+    numbers, places = ir.VectorType(ir.DoubleType(), WIDE), ir.VectorType(WORD, WIDE)
+    nothing, steps = ir.Constant(numbers, [0.0] * WIDE), ir.Constant(places, list(range(WIDE)))
+    align = ir.Constant(ir.IntType(32), 8)
+
+    def chosen(builder: Any, scores: Any, start: Any, count: Any) -> Any:
+        """Which of the scores from a start on are not negative, of no more than a count; what is no number is not."""
+        room = spread(builder, builder.sub(count, start), WIDE)
+        inside = builder.icmp_signed("<", steps, room)
+        return builder.and_(inside, builder.fcmp_unordered(">=", load(builder, scores, start, WIDE), nothing))
+
+    @intrinsic
+    def pick(
+        typing_context: Any, scores: Any, count: Any, table: Any, first: Any, length: Any, out: Any, n: Any
+    ) -> Any:
+        """Pick of so many places of a table's columns, from one on, behind the n that out has; how many it has then.
+
+        Behind these, up to WIDE - 1 numbers of each column are overwritten.
+        """
+
+        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            at, source, target = (data_of(context, builder, signature, arguments, k) for k in (0, 2, 5))
+            pointer, module = numbers.as_pointer(), builder.module
+            fetch = cgutils.get_or_insert_function(
+                module,
+                ir.FunctionType(numbers, [pointer, align.type, flags, numbers]),
+                f"llvm.masked.load.v{WIDE}f64.p0",
+            )
+            press = cgutils.get_or_insert_function(
+                module,
+                ir.FunctionType(numbers, [numbers, flags, numbers]),
+                f"llvm.experimental.vector.compress.v{WIDE}f64",
+            )
+            found = cgutils.alloca_once_value(builder, arguments[6])
+            with cgutils.for_range_slice(builder, number(0), arguments[1], number(WIDE), WORD) as (start, _):
+                mask, behind = chosen(builder, at, start, arguments[1]), builder.load(found)
+                for k in range(columns):
+                    place = builder.add(builder.add(arguments[3], start), builder.mul(number(k), arguments[4]))
+                    origin = builder.bitcast(place_of(builder, source, place), pointer)
+                    values = builder.call(press, [builder.call(fetch, [origin, align, mask, nothing]), mask, nothing])
+                    store(builder, values, target, builder.add(behind, number(k * stride)))
+                more = builder.zext(builder.ctpop(builder.bitcast(mask, word)), WORD)
+                builder.store(builder.add(behind, more), found)
+            return builder.load(found)
+
+        return types.intp(scores, types.intp, table, types.intp, types.intp, out, types.intp), generate
+
+    return pick

@@ -16,18 +16,22 @@ CURVED: Final = 10.0
 
 @exact
 def centre(p, accepted):
-    """Fill `end`: one step on from the best point, without an evaluation.
+    """Fill `end`: one step of Newton's method from the best point, without an evaluation, where that is short.
 
-    A step of Newton's method is corrected to first order for the force at the time step's mean velocity instead of its
-    end. What is stiff against the mass is left out of that, by M A^-1: a body that stops in the step stays stopped.
+    It is corrected to first order for the force at the time step's mean velocity instead of its end. What is stiff
+    against the mass is left out of that, by M A^-1: a body that stops in the step stays stopped. Else it is the best
+    point itself, if that is near enough, or a step along secants.
 
     Args:
         p: The equation.
-        accepted: Whether that is the step of Newton's method in `search`; else it goes along secants.
+        accepted: Whether `search` holds that short step.
     """
     v, start, end, mean = equation.velocity_of(p, POINT.best), equation.start(p), equation.end(p), equation.mean(p)
-    if not accepted:
+    if not accepted and equation.numbers(p).solved == 0.0:
         _brake(p)
+        return
+    if not accepted:
+        linear_algebra.copy(v, end)
         return
     for k in range(v.size):
         end[k] = v[k] + equation.search(p)[k]
@@ -47,7 +51,7 @@ def centre(p, accepted):
 def _brake(p):
     """Fill `end` with a step from the best point along the bodies' secants, which become their derivatives.
 
-    It cannot overshoot: a step of Newton's method that nothing has checked kicks bodies that have all but stopped.
+    It cannot overshoot: a long step of Newton's method that nothing has checked kicks bodies that have all but stopped.
     """
     v, twist = equation.velocity_of(p, POINT.best), doubles(stack_doubles(6), 6)
     for b in range(equation.head(p).nbody):

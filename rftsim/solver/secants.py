@@ -30,11 +30,11 @@ LASTS: Final = 2
 """Steps for which a secant is taken, but for its size."""
 FEW: Final = 6
 """Steps after which secants are followed of all bodies."""
-STEPS: Final = 5
+STEPS: Final = 3
 """Steps of Newton's method, at most, to where secants lead."""
 DROP: Final = 0.8
 """Share of what is missing that one of these leaves at most; else the wrenches are taken for linear."""
-LEFT: Final = 1e-3
+LEFT: Final = 0.1
 """Share of what was missing at which they end."""
 FASTER: Final = 3.0
 """Size of a velocity that may be led to, over that at the start or of the best point: sand takes energy out."""
