@@ -37,8 +37,7 @@ NEAR: Final = 0.25
 BESIDE: Final = 0.3
 """Speed, over v_c, at which a body is tried beside its rest."""
 CLOSE: Final = (0.5, 0.1)
-"""Missing impulse, over all impulses, up to which a body's rest is tried, or less of a step: of a body that is alone,
-and of several."""
+"""Missing impulse, over all impulses, up to which less of a step is tried: of a body that is alone, and of several."""
 STAGES: Final = 2
 """Stages, after the first, in which a body that is alone comes to its equation by way of smoother ones."""
 SLIDES: Final = 4.0
@@ -81,7 +80,7 @@ def _arrange_other(p, crossing):
         return
     is_alone = equation.head(p).nbody == 1
     is_close = now.missing < (CLOSE[0] if is_alone else CLOSE[1]) * now.scale
-    is_asked = is_close and progress.shortened == 0.0 and progress.rested == 0.0
+    is_asked = progress.shortened == 0.0 and progress.rested == 0.0
     rest = _rest_along(p, equation.search(p), progress.share) if is_asked else 0.0
     if rest > 0.0:
         progress.rested = 1.0
