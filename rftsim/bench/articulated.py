@@ -29,6 +29,10 @@ SERVOS: Final = (2.0, 20.0)
 SLOPE: Final = 20.0
 """Largest slope of the free surface [deg]."""
 
+_S = mujoco.mjtState
+STATE: Final = int(_S.mjSTATE_TIME | _S.mjSTATE_QPOS | _S.mjSTATE_QVEL | _S.mjSTATE_ACT | _S.mjSTATE_WARMSTART)
+"""What of a state a scene has with sand and without."""
+
 _MOVED: Final = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
 
 
@@ -87,13 +91,48 @@ class Scene:
     def lost(self, h: float, duration: float) -> bool:
         """Whether MuJoCo loses the scene without sand, in free fall over a duration [s]."""
         model = self.bare(h)
-        data = self.start(model)
-        for _ in range(round(duration / h)):
+        return self._falls_apart(model, self.start(model), duration)
+
+    def lost_from(self, h: float, states: list[Array], duration: float) -> tuple[float, float] | None:
+        """The first of states, see `state_of`, from which MuJoCo loses the scene without sand within a duration [s].
+
+        Returns:
+            Its time [s], and its kinetic energy over that of the first state; None where there is none.
+        """
+        model = self.bare(h)
+        data = mujoco.MjData(model)
+        for state in states:
+            mujoco.mj_setState(model, data, state, STATE)
+            time = data.time
+            if self._falls_apart(model, data, duration):
+                return time, _kinetic_energy(model, state) / _kinetic_energy(model, states[0])
+        return None
+
+    def _falls_apart(self, model: mujoco.MjModel, data: mujoco.MjData, duration: float) -> bool:
+        lost = False
+        for _ in range(round(duration / model.opt.timestep)):
             self.move(data)
             mujoco.mj_step(model, data)
-            if is_lost(data):
-                return True
-        return False
+            lost = is_lost(data)
+            if lost:
+                mujoco.mj_resetData(model, data)
+                break
+        return lost
+
+
+def state_of(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
+    """The state of a scene's data but what the sand keeps of its own: numbers of STATE."""
+    state = np.empty(mujoco.mj_stateSize(model, STATE))
+    mujoco.mj_getState(model, data, state, STATE)
+    return state
+
+
+def _kinetic_energy(model: mujoco.MjModel, state: Array) -> float:
+    data = mujoco.MjData(model)
+    mujoco.mj_setState(model, data, state, STATE)
+    mujoco.mj_forward(model, data)
+    mujoco.mj_energyVel(model, data)
+    return float(data.energy[1])
 
 
 @functools.lru_cache(maxsize=4)

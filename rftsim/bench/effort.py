@@ -34,6 +34,9 @@ class Effort(NamedTuple):
     """Whether MuJoCo reset the simulation, or would have, or its positions are not finite."""
     lost_bare: bool
     """Whether the same is so without sand."""
+    bare_from: tuple[float, float] | None = None
+    """Where it is lost with sand alone: when it first was in a state from which it is lost without, too [s], and its
+    kinetic energy then over that at the start; None where it never was."""
 
 
 class Meter:

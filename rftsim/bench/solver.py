@@ -153,8 +153,14 @@ def _play_case(case: str, h: float) -> Effort:
 def _play_scene(seed: str, h: float) -> Effort:
     scene, meter = articulated.articulated(int(seed)), Meter()
     model = scene.sandy(h)
-    data = scene.start(model)
+    data, states = scene.start(model), []
     for _ in range(round(DURATION / h)):
+        if meter.lost:
+            break
+        states.append(articulated.state_of(model, data))
         scene.move(data)
         meter.advance(model, data)
-    return meter.effort(lost_bare=scene.lost(h, DURATION))
+    effort = meter.effort(lost_bare=scene.lost(h, DURATION))
+    if not effort.lost or effort.lost_bare:
+        return effort
+    return effort._replace(bare_from=scene.lost_from(h, states, DURATION))

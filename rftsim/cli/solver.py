@@ -69,7 +69,17 @@ def weigh_solver(cases: tuple[str, ...], count: int, quick: bool, memory: Path, 
     for what, found in listed.items():
         told = (f"{one.member} at {1e3 * one.h:g} ms ({BY[what](one.effort):.3g})" for one in found)
         print_line(console, f"scenes by {what}: {', '.join(told) or 'none'}")
-    print_line(console, f"lost: {', '.join(f'{one.member} at {1e3 * one.h:g} ms' for one in lost(played)) or 'none'}")
+    print_line(console, f"lost: {', '.join(_fate(one) for one in lost(played)) or 'none'}")
+
+
+def _fate(one: Played) -> str:
+    told = f"{one.member} at {1e3 * one.h:g} ms"
+    if one.effort.bare_from is None:
+        return told
+    time, energy = one.effort.bare_from
+    return (
+        f"{told} (without sand as well from {time:.3g} s on, by then with {100 * energy:.2g} % of its kinetic energy)"
+    )
 
 
 def _table(rows: list[Summary]) -> Table:

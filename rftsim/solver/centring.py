@@ -7,6 +7,8 @@ from rftsim.machine.memory import doubles, stack_doubles
 from rftsim.solver import equation, linear_algebra, linearised, matrices
 from rftsim.solver.equation import POINT
 from rftsim.solver.motion import add_wrench, differentiate, evaluate, felt_twist, generalised, speed_of, twist_of
+from rftsim.solver.residual import attempt
+from rftsim.solver.steps import keep_best
 
 CENTRED: Final = 3e-3
 """Effect of the force's change within a step on a body's velocity, relative, from which on it is counted."""
@@ -20,17 +22,16 @@ def centre(p, accepted):
 
     It is corrected to first order for the force at the time step's mean velocity instead of its end. What is stiff
     against the mass is left out of that, by M A^-1: a body that stops in the step stays stopped. Else it is the best
-    point itself, if that is near enough, or a step along secants.
+    point itself, or what is better a step along secants on, where it is not near.
 
     Args:
         p: The equation.
         accepted: Whether `search` holds that short step.
     """
     v, start, end, mean = equation.velocity_of(p, POINT.best), equation.start(p), equation.end(p), equation.mean(p)
-    if not accepted and equation.numbers(p).solved == 0.0:
-        _brake(p)
-        return
     if not accepted:
+        if equation.numbers(p).solved == 0.0:
+            _brake(p)
         linear_algebra.copy(v, end)
         return
     for k in range(v.size):
@@ -49,9 +50,10 @@ def centre(p, accepted):
 
 @exact
 def _brake(p):
-    """Fill `end` with a step from the best point along the bodies' secants, which become their derivatives.
+    """Take a step from the best point along the bodies' secants, which become their derivatives, if that is better.
 
-    It cannot overshoot: a long step of Newton's method that nothing has checked kicks bodies that have all but stopped.
+    A long step that nothing has checked kicks bodies: rows hold against any force, and forces of a thousand times
+    what the sand bears are then a solution of what is linear.
     """
     v, twist = equation.velocity_of(p, POINT.best), doubles(stack_doubles(6), 6)
     for b in range(equation.head(p).nbody):
@@ -60,8 +62,10 @@ def _brake(p):
         linear_algebra.copy_matrix(equation.secant(p, b), equation.derivative(p, b))
         equation.kept(p, b).known = 1.0
     errors, missing = equation.errors_of(p, POINT.best), equation.residual_of(p, POINT.best)
-    linearised.solution(p, v, errors, missing, linearised.EXACT, equation.end(p))
-    _follow(p)
+    linearised.solution(p, v, errors, missing, linearised.EXACT, equation.velocity_of(p, POINT.new))
+    linear_algebra.copy(equation.row_error(p), equation.errors_of(p, POINT.new))
+    attempt(p, POINT.new)
+    keep_best(p, POINT.new)
 
 
 @exact

@@ -45,10 +45,16 @@ def size_of(twist, length):
 
 
 @exact
+def square_of(twist, length):
+    """The square of a velocity and that of an angular velocity times a length [m^2/s^2]."""
+    u, w = twist[:3], twist[3:]
+    return linear_algebra.dot(u, u) + length * length * linear_algebra.dot(w, w)
+
+
+@exact
 def pace_of(p, b, twist):
-    """The root of the squares of body b's velocity, of its angular velocity times its length, and of v_c [m/s]."""
-    u, w, length, v_c = twist[:3], twist[3:], equation.length(p)[b], equation.numbers(p).v_c
-    return np.sqrt(linear_algebra.dot(u, u) + length * length * linear_algebra.dot(w, w) + v_c * v_c)
+    """The root of the square of a twist of body b, see `square_of`, and that of v_c [m/s]."""
+    return np.sqrt(square_of(twist, equation.length(p)[b]) + equation.numbers(p).v_c ** 2)
 
 
 @exact

@@ -18,7 +18,7 @@ from rftsim.machine.compiling import exact
 from rftsim.machine.memory import doubles, stack_doubles
 from rftsim.solver import constraint_rows, equation, linear_algebra, linearised, matrices, residual
 from rftsim.solver.equation import POINT
-from rftsim.solver.motion import differentiate, felt_twist, generalised, pace_of, told
+from rftsim.solver.motion import differentiate, felt_twist, generalised, pace_of, square_of, told
 from rftsim.solver.residual import attempt, copy_point
 from rftsim.solver.steps import BUDGET, DERIVATIVE, RESERVE, keep_best, note_misfits, poor_misfit, worth
 
@@ -106,7 +106,7 @@ def _take_secants(p, anew):
         else:
             share = pace[b] / now
         linear_algebra.multiply(s, twist, wrench)
-        square = now * now - equation.numbers(p).v_c ** 2 + TINY
+        square = square_of(twist, length) + TINY
         for r in range(6):
             missed = (known[r] - share * wrench[r]) / square
             for k in range(6):

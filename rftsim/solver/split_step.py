@@ -27,10 +27,16 @@ SHALLOWEST: Final = 1e-4
 """Depth [m] below which none is resolved."""
 FIRST: Final = 3.9
 """What counts for that error in a first step in which a body moves by more than is allowed: two parts."""
-PART_COSTS: Final = 3.0
-"""Evaluations' worth of a part, about."""
+LEAST_COST: Final = 3.0
+"""Evaluations' worth of a part, at least."""
 MORE: Final = 2.0
 """Factor to which a step is split finer than was foreseen, where a part of it asks for that."""
+
+
+@exact
+def affordable(p, cost):
+    """How many parts can be solved with what is left, if one costs as many evaluations' worth as another did."""
+    return (BUDGET - RESERVE - worth(p)) / max(LEAST_COST, cost)
 
 
 @exact
@@ -87,17 +93,21 @@ def _later_force(p, b):
 
 
 @exact
-def split_step(p, parts):
-    """Take the step in parts, and shorter ones where the equation of one is not solved, as far as evaluations last."""
+def split_step(p, parts, cost):
+    """Take the step in parts, and shorter ones where the equation of one is not solved, as far as evaluations last.
+
+    The first is thought to cost so many evaluations' worth, each other one as many as the one before it did.
+    """
     h, end = equation.numbers(p).timestep, equation.end(p)
     drift = _begin(p)
     part, done, needed = h / parts, 0.0, 1.0
     while done < h * (1.0 - 1e-9):
-        left = BUDGET - RESERVE - worth(p)
-        part = min(max(part, (h - done) / max(left / PART_COSTS, 1.0)), h - done)
+        part = min(max(part, (h - done) / max(affordable(p, cost), 1.0)), h - done)
         if h - done - part < 0.3 * part:
             part = h - done
+        cost = -worth(p)
         _solve_part(p, drift, part)
+        cost += worth(p)
         if equation.numbers(p).solved == 0.0:
             if part > h / (8.0 * parts) and worth(p) < 0.5 * BUDGET:
                 part *= 0.25
@@ -210,14 +220,22 @@ def _leave_to_mujoco(p, touched):
 
 
 @exact
-def remember(p):
-    """Keep each body's force at the end of the solution at hand, at the later depths, for the next one."""
+def keep(p, later):
+    """Keep each body's force at the end of the solution at hand for the next one, at the depths of `wrench_of`."""
     v = equation.velocity_of(p, POINT.best)
     for b in range(equation.head(p).nbody):
         kept = equation.kept(p, b)
         felt_twist(p, b, v, kept.twist)
+        linear_algebra.copy(equation.wrench_of(p, POINT.best, b, later), kept.wrench)
+
+
+@exact
+def remember(p):
+    """Keep each body's force at the later depths, and its strain, for what follows the solution at hand."""
+    keep(p, 1)
+    for b in range(equation.head(p).nbody):
+        kept = equation.kept(p, b)
         hold(p, b, kept.twist, kept.strain)
-        linear_algebra.copy(equation.wrench_of(p, POINT.best, b, 1), kept.wrench)
 
 
 @exact

@@ -15,7 +15,7 @@ from rftsim.solver import equation, linear_algebra, matrices
 from rftsim.solver.equation import POINT
 from rftsim.solver.motion import size_of, twist_of
 from rftsim.solver.newton import STRAIN, solve
-from rftsim.solver.split_step import finish, parts_needed, remember, split_step
+from rftsim.solver.split_step import affordable, finish, keep, parts_needed, remember, split_step
 from rftsim.solver.state import KEPT_NUMBERS
 from rftsim.solver.step_equation import answer_to, force_to, prepare, reset
 from rftsim.solver.steps import BUDGET, worth
@@ -24,12 +24,14 @@ MOST_PARTS: Final = (24.0, 1.0)
 """Parts of a step; where those did work, it is taken whole."""
 UNSOLVED_PARTS: Final = 4.0
 """Parts at least of a step that was not solved as a whole."""
+PART_COSTS: Final = 0.5
+"""Share of what the solution of a whole step took that one of a part is thought to take."""
 LATE: Final = 0.5
 """Share of the evaluations' worth of a step from which on what is found is kept: there are too few for another way."""
 HUGE: Final = 1e9
 """Size from which on a force [N] or a velocity [m/s] is not taken for one."""
 GAIN: Final = 1e-7
-"""Work that the sand may do in a step over the kinetic energy: rounding, not physics, and more is taken back."""
+"""Work that the sand may do in a step, over v'Mv, twice the kinetic energy: more than rounding is taken back."""
 
 
 @entry(types.void, address)
@@ -158,22 +160,36 @@ def _take_back(p, allowed, work):
 
 
 @exact
+def _parts(p, cost):
+    """Into how many parts to split a step that was solved as a whole, if one costs so many evaluations' worth.
+
+    Where the evaluations that are left would not solve them, it stays whole.
+    """
+    numbers = equation.numbers(p)
+    needed = parts_needed(p, numbers.timestep)
+    if numbers.solved == 0.0:
+        needed = max(needed, UNSOLVED_PARTS)
+    return needed if affordable(p, cost) >= 2.0 else 1.0
+
+
+@exact
 def _one_step(p, most_parts):
     """A step from the state before: in parts where the last one asks for that, or its own solution does; else whole."""
     numbers, start, lacking = equation.numbers(p), equation.start(p), equation.lacking(p)
     h, drift = numbers.timestep, numbers.drift if numbers.drift > 0.0 else numbers.timestep
+    before, cost = worth(p), 0.0
     reset(p)
     for k in range(start.size):
         start[k] += lacking[k]
     if numbers.parts <= 1.0 or most_parts == 1:
         prepare(p, 0.5 * (drift + h))
         solve(p)
-        needed = parts_needed(p, h)
-        if numbers.solved == 0.0:
-            needed = 1.0 if _is_late(p) else max(needed, UNSOLVED_PARTS)
-        numbers.parts = needed
+        cost = PART_COSTS * (worth(p) - before)
+        numbers.parts = _parts(p, cost)
+        if numbers.parts > 1.0:
+            keep(p, 0)
     if numbers.parts > 1.0 and most_parts > 1:
-        split_step(p, min(numbers.parts, most_parts))
+        split_step(p, min(numbers.parts, most_parts), cost)
         return
     if numbers.solved == 0.0:
         equation.work(p).unsolved += 1.0
