@@ -6,7 +6,7 @@ import pytest
 
 import rftsim
 from rftsim.bench import solver
-from rftsim.bench.articulated import articulated
+from rftsim.bench.articulated import articulated, state_of
 from rftsim.bench.effort import Effort, Meter
 from rftsim.bench.trials import is_lost
 
@@ -83,6 +83,25 @@ def test_few_equations_are_left_unsolved():
         unsolved, evaluations = unsolved + spent.unsolved, evaluations + spent.evaluations
     assert unsolved <= 40
     assert evaluations <= 3.0 * 40 * 100
+
+
+def test_where_a_scene_falls_apart_without_sand():
+    """What MuJoCo loses without sand it loses from its first state; what it does not, from none of two."""
+    h, kinds = 2e-2, set()
+    for seed in range(12):
+        scene = articulated(seed)
+        model = scene.bare(h)
+        data = scene.start(model)
+        states = [state_of(model, data)]
+        scene.move(data)
+        mujoco.mj_step(model, data)
+        states.append(state_of(model, data))
+        is_lost_bare = scene.lost(h, 1.0)
+        kinds.add(is_lost_bare)
+        assert (scene.lost_from(h, states[:1], 1.0) == (0.0, 1.0)) == is_lost_bare
+        if not is_lost_bare:
+            assert scene.lost_from(h, states, 1.0 - h) is None
+    assert kinds == {True, False}
 
 
 def test_a_solution_that_is_none_does_no_work():
