@@ -8,7 +8,7 @@ from rftsim.solver import equation, linear_algebra, linearised, matrices
 from rftsim.solver.equation import POINT
 from rftsim.solver.motion import add_wrench, differentiate, evaluate, felt_twist, generalised, speed_of, twist_of
 from rftsim.solver.residual import attempt
-from rftsim.solver.steps import is_near, keep_best
+from rftsim.solver.steps import keep_best
 
 CENTRED: Final = 3e-3
 """Effect of the force's change within a step on a body's velocity, relative, from which on it is counted."""
@@ -66,7 +66,6 @@ def _brake(p):
     linear_algebra.copy(equation.row_error(p), equation.errors_of(p, POINT.new))
     attempt(p, POINT.new)
     keep_best(p, POINT.new)
-    equation.numbers(p).solved = 1.0 if is_near(p) else 0.0
 
 
 @exact

@@ -22,7 +22,6 @@ from rftsim.solver.residual import attempt
 from rftsim.solver.steps import (
     BUDGET,
     DERIVATIVE,
-    LESS,
     RESERVE,
     is_misled,
     keep_best,
@@ -92,12 +91,13 @@ def _arrange_other(p, crossing):
     elif is_close and progress.shortened < 2.0 and not (is_alone and progress.eased == 0.0):
         _shorten(p, crossing)  # a face changes its side along the way
         return
-    else:
-        if is_alone and progress.eased == 0.0:
-            progress.eased = 1.0
-            _ease(p)
+    elif is_alone and progress.eased == 0.0:
+        progress.eased = 1.0
+        _ease(p)
         secants.follow(p, progress.enough)
-        progress.enough = max(LESS * progress.enough, LEAST)
+    else:
+        secants.follow(p, progress.enough)
+        progress.enough = max(0.3 * progress.enough, LEAST)
     linear_algebra.clear(equation.is_fresh(p))
     progress.is_stale, progress.shortened = 1.0, 0.0
 

@@ -36,11 +36,8 @@ from rftsim.solver.steps import (
     ENOUGH,
     KEPT_LEAVES,
     LEAST_LEFT,
-    LOOSEST,
     RESERVE,
-    ROUGH,
     choose_direction,
-    is_near,
     keep_best,
     missed_by,
     move_on,
@@ -63,21 +60,25 @@ MOST_FORCE: Final = 6e-3
 """The same over all impulses at most: what holds a plate on its way edge-on jumps within a hundredth of its speed."""
 PATIENCE: Final = 6.0
 """Iterations after which the tolerance is loosened."""
+LOOSEST: Final = 20.0
+"""Factor to which that is."""
 HELD: Final = 30.0
 """Speed over v_c below which a body is held by the sand, or nearly."""
 HELD_FORCE: Final = 0.1
 """Missing impulse that is allowed where one is, over all impulses and the tolerance."""
 STRICT: Final = 2.0
 """Iterations in which that holds."""
-LATER: Final = 2.0
-"""Iterations after which as much may be missing as where a point is near."""
+ROUGH: Final = (2.0, 2e-2)
+"""Iterations after which more may be missing, and how much, over all impulses. Where many small faces switch, no
+derivative tells how the force goes on; the velocities are right then, and the force of a step is off by that."""
 
 
 @entry(types.void, address)
 def solve(p):
     """Solve the equation: fill `end` and its numbers, leave the velocity and its wrenches in point POINT.best."""
     _begin(p)
-    progress, accepted = equation.progress(p), False
+    progress, best = equation.progress(p), equation.scores(p, POINT.best)
+    accepted = False
     while not accepted:
         if progress.shortened == 0.0:
             choose_direction(p)
@@ -93,7 +94,8 @@ def solve(p):
             _accept(p)
     if accepted:
         copy_point(p, POINT.now, POINT.best)
-    equation.numbers(p).solved = 1.0 if accepted or is_near(p) else 0.0
+    near = best.error <= LOOSEST or best.missing <= ROUGH[1] * best.scale
+    equation.numbers(p).solved = 1.0 if accepted or near else 0.0
     centre(p, accepted)
 
 
@@ -111,7 +113,7 @@ def _is_given_up(p):
     progress, best = equation.progress(p), equation.scores(p, POINT.best)
     if progress.iteration >= equation.numbers(p).iterations or worth(p) > BUDGET - RESERVE - DERIVATIVE:
         return True
-    return progress.iteration > PATIENCE and (best.error <= progress.loosened or best.missing < ROUGH * best.scale)
+    return progress.iteration > PATIENCE and (best.error <= progress.loosened or best.missing < ROUGH[1] * best.scale)
 
 
 @exact
@@ -164,8 +166,8 @@ def _is_short(p):
             return False
         if speed_of(p, b, there) < HELD * numbers.v_c and progress.iteration < STRICT:
             force = HELD_FORCE * numbers.tolerance
-    if progress.iteration >= LATER:
-        force = max(force, ROUGH)
+    if progress.iteration >= ROUGH[0]:
+        force = max(force, ROUGH[1])
     return left * now.missing <= force * now.scale
 
 

@@ -35,7 +35,7 @@ MORE: Final = 2.0
 
 @exact
 def affordable(p, cost):
-    """How many parts can be solved with what is left, if one costs as many evaluations' worth as another did."""
+    """How many parts can be solved with what is left, if one costs so many evaluations' worth."""
     return (BUDGET - RESERVE - worth(p)) / max(LEAST_COST, cost)
 
 
@@ -93,21 +93,16 @@ def _later_force(p, b):
 
 
 @exact
-def split_step(p, parts, cost):
-    """Take the step in parts, and shorter ones where the equation of one is not solved, as far as evaluations last.
-
-    The first is thought to cost so many evaluations' worth, each other one as many as the one before it did.
-    """
+def split_step(p, parts):
+    """Take the step in parts, and shorter ones where the equation of one is not solved, as far as evaluations last."""
     h, end = equation.numbers(p).timestep, equation.end(p)
     drift = _begin(p)
     part, done, needed = h / parts, 0.0, 1.0
     while done < h * (1.0 - 1e-9):
-        part = min(max(part, (h - done) / max(affordable(p, cost), 1.0)), h - done)
+        part = min(max(part, (h - done) / max(affordable(p, LEAST_COST), 1.0)), h - done)
         if h - done - part < 0.3 * part:
             part = h - done
-        cost = -worth(p)
         _solve_part(p, drift, part)
-        cost += worth(p)
         if equation.numbers(p).solved == 0.0:
             if part > h / (8.0 * parts) and worth(p) < 0.5 * BUDGET:
                 part *= 0.25
@@ -220,22 +215,14 @@ def _leave_to_mujoco(p, touched):
 
 
 @exact
-def keep(p, later):
-    """Keep each body's force at the end of the solution at hand for the next one, at the depths of `wrench_of`."""
+def remember(p):
+    """Keep each body's force at the end of the solution at hand, at the later depths, for the next one."""
     v = equation.velocity_of(p, POINT.best)
     for b in range(equation.head(p).nbody):
         kept = equation.kept(p, b)
         felt_twist(p, b, v, kept.twist)
-        linear_algebra.copy(equation.wrench_of(p, POINT.best, b, later), kept.wrench)
-
-
-@exact
-def remember(p):
-    """Keep each body's force at the later depths, and its strain, for what follows the solution at hand."""
-    keep(p, 1)
-    for b in range(equation.head(p).nbody):
-        kept = equation.kept(p, b)
         hold(p, b, kept.twist, kept.strain)
+        linear_algebra.copy(equation.wrench_of(p, POINT.best, b, 1), kept.wrench)
 
 
 @exact

@@ -14,7 +14,7 @@ BUDGET: Final = 60.0
 """Evaluations' worth of one step of all bodies."""
 DERIVATIVE: Final = 2.0
 """Evaluations that a derivative is worth."""
-RESERVE: Final = 5.0
+RESERVE: Final = 4.0
 """Evaluations' worth that is left unspent by one solution, for what follows it."""
 KEPT_LEAVES: Final = 0.3
 FRESH_LEAVES: Final = 0.1
@@ -23,13 +23,6 @@ LEAST_LEFT: Final = 0.02
 at least, where the last step showed it."""
 ENOUGH: Final = 0.05
 """Missing impulse, over all impulses, up to which secants are followed at first."""
-LESS: Final = 0.3
-"""Factor on that from each time to the next; from the third on, what a new derivative foresees is not trusted."""
-LOOSEST: Final = 20.0
-"""Factor to which the tolerance is loosened."""
-ROUGH: Final = 2e-2
-"""Missing impulse, over all impulses, with which a point is near. Where many small faces switch, no derivative tells
-how the force goes on; the velocities are right then, and the force of a step is off by that."""
 STEADY: Final = 0.5
 """Share of the square of what was missed that may be left by the trend that is foreseen."""
 POOR: Final = 0.2
@@ -173,7 +166,7 @@ def _refresh(p):
             differentiate(p, b, twist, 0.0)
             fresh[b], misfit[b], equation.kept(p, b).known = 1.0, 0.0, 1.0
     progress = equation.progress(p)
-    progress.is_stale, progress.contraction = 0.0, FRESH_LEAVES if progress.enough >= LESS * ENOUGH else 1.0
+    progress.is_stale, progress.contraction = 0.0, FRESH_LEAVES if progress.enough == ENOUGH else 1.0
 
 
 @exact
@@ -182,13 +175,6 @@ def keep_best(p, k):
     tried, best = equation.scores(p, k), equation.scores(p, POINT.best)
     if tried.missing * best.scale < best.missing * tried.scale:
         copy_point(p, k, POINT.best)
-
-
-@exact
-def is_near(p):
-    """Whether the best point will do where nothing better is found."""
-    best = equation.scores(p, POINT.best)
-    return best.error <= LOOSEST or best.missing <= ROUGH * best.scale
 
 
 @exact

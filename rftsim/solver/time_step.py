@@ -15,7 +15,7 @@ from rftsim.solver import equation, linear_algebra, matrices
 from rftsim.solver.equation import POINT
 from rftsim.solver.motion import size_of, twist_of
 from rftsim.solver.newton import STRAIN, solve
-from rftsim.solver.split_step import affordable, finish, keep, parts_needed, remember, split_step
+from rftsim.solver.split_step import affordable, finish, parts_needed, remember, split_step
 from rftsim.solver.state import KEPT_NUMBERS
 from rftsim.solver.step_equation import answer_to, force_to, prepare, reset
 from rftsim.solver.steps import BUDGET, worth
@@ -163,13 +163,15 @@ def _take_back(p, allowed, work):
 def _parts(p, cost):
     """Into how many parts to split a step that was solved as a whole, if one costs so many evaluations' worth.
 
-    Where the evaluations that are left would not solve them, it stays whole.
+    Where the evaluations that are left would not solve them, it stays whole. A body alone is split nonetheless: what
+    is dragged or thrown edge-on comes to another solution in a long step.
     """
     numbers = equation.numbers(p)
     needed = parts_needed(p, numbers.timestep)
     if numbers.solved == 0.0:
-        needed = max(needed, UNSOLVED_PARTS)
-    return needed if affordable(p, cost) >= 2.0 else 1.0
+        needed = 1.0 if _is_late(p) else max(needed, UNSOLVED_PARTS)
+    is_begun = equation.head(p).nbody == 1 or affordable(p, cost) >= 2.0
+    return needed if is_begun else 1.0
 
 
 @exact
@@ -177,19 +179,16 @@ def _one_step(p, most_parts):
     """A step from the state before: in parts where the last one asks for that, or its own solution does; else whole."""
     numbers, start, lacking = equation.numbers(p), equation.start(p), equation.lacking(p)
     h, drift = numbers.timestep, numbers.drift if numbers.drift > 0.0 else numbers.timestep
-    before, cost = worth(p), 0.0
+    before = worth(p)
     reset(p)
     for k in range(start.size):
         start[k] += lacking[k]
     if numbers.parts <= 1.0 or most_parts == 1:
         prepare(p, 0.5 * (drift + h))
         solve(p)
-        cost = PART_COSTS * (worth(p) - before)
-        numbers.parts = _parts(p, cost)
-        if numbers.parts > 1.0:
-            keep(p, 0)
+        numbers.parts = _parts(p, PART_COSTS * (worth(p) - before))
     if numbers.parts > 1.0 and most_parts > 1:
-        split_step(p, min(numbers.parts, most_parts), cost)
+        split_step(p, min(numbers.parts, most_parts))
         return
     if numbers.solved == 0.0:
         equation.work(p).unsolved += 1.0

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import rftsim
-from rftsim.bench import solver
+from rftsim.bench import hard_cases, solver
 from rftsim.bench.articulated import articulated, state_of
 from rftsim.bench.effort import Effort, Meter
 from rftsim.bench.trials import is_lost
@@ -116,6 +116,28 @@ def test_a_solution_that_is_none_does_no_work():
         let_go += unsolved > before and not rftsim.wrenches(model, data).force.any()
     assert let_go > 0
     assert meter.effort().gain < 1e-6
+
+
+def test_light_feet_are_not_let_go():
+    """On legs of 10 g links, steps that are not solved still have a force of the sand, and one that throws nothing.
+
+    What was linear there was a solution of 1e8 to 1e27 times the velocity, for rows hold against any force: it was let
+    go, or MuJoCo lost the simulation.
+    """
+    trial = hard_cases.legs(H, "implicit")
+    model, data, let_go, fastest = trial.model, trial.data, 0, 0.0
+    for seed in (147, 349, 769, 790, 806, 818):
+        mujoco.mj_resetData(model, data)
+        move, unsolved = hard_cases.start_at_random(trial, seed), 0
+        for _ in range(round(1.0 / H)):
+            move(data)
+            mujoco.mj_step(model, data)
+            before, unsolved = unsolved, rftsim.work(model, data).unsolved
+            let_go += unsolved > before and not rftsim.wrenches(model, data).force.any()
+            fastest = max(fastest, np.abs(data.qvel).max())
+        assert not is_lost(data)
+    assert let_go <= 2  # 9 before
+    assert fastest < 60.0
 
 
 def test_the_meter_counts_what_work_counts():
