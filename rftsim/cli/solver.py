@@ -77,9 +77,7 @@ def _fate(one: Played) -> str:
     if one.effort.bare_from is None:
         return told
     time, energy = one.effort.bare_from
-    return (
-        f"{told} (without sand as well from {time:.3g} s on, by then with {100 * energy:.2g} % of its kinetic energy)"
-    )
+    return f"{told} (without sand as well from {time:.3g} s on, with {energy:.2g} of the kinetic energy of its start)"
 
 
 def _table(rows: list[Summary]) -> Table:
