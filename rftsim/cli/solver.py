@@ -69,10 +69,11 @@ def weigh_solver(cases: tuple[str, ...], count: int, quick: bool, memory: Path, 
     for what, found in listed.items():
         told = (f"{one.member} at {1e3 * one.h:g} ms ({BY[what](one.effort):.3g})" for one in found)
         print_line(console, f"scenes by {what}: {', '.join(told) or 'none'}")
-    print_line(console, f"lost: {', '.join(_fate(one) for one in lost(played)) or 'none'}")
+    print_line(console, f"lost: {', '.join(fate(one) for one in lost(played)) or 'none'}")
 
 
-def _fate(one: Played) -> str:
+def fate(one: Played) -> str:
+    """Tell which simulation is lost, and since when it is without sand as well."""
     told = f"{one.member} at {1e3 * one.h:g} ms"
     if one.effort.bare_from is None:
         return told

@@ -9,6 +9,7 @@ from rftsim.bench import hard_cases, solver
 from rftsim.bench.articulated import articulated, state_of
 from rftsim.bench.effort import Effort, Meter
 from rftsim.bench.trials import is_lost
+from rftsim.cli.solver import fate
 
 H = 5e-3
 SEEDS = range(12)
@@ -183,6 +184,17 @@ def test_the_study_is_remembered(tmp_path):
     assert (first.lost, first.lost_bare) == (0, 1)
     assert solver.lost(played) == []
     assert [one.member for one in solver.hardest(played, lambda effort: effort.worst)] == ["b", "a"]
+
+
+def test_the_study_tells_where_a_scene_is_lost_bare(tmp_path):
+    """What a scene that is lost on sand alone had come to is remembered, and told in the line of what is lost."""
+    effort = Effort(10, 20, 5, 7, 1, 0.1, 0.2, True, False, (0.25, 0.5))
+    group = solver.Group("made up", ("a",), lambda name, h: effort)
+    for _ in range(2):
+        played = solver.Study(tmp_path / "solver.json").play(group, (1e-2,), lambda _: None)
+        (one,) = solver.lost(played)
+        assert tuple(one.effort.bare_from) == (0.25, 0.5)
+    assert fate(one) == "a at 10 ms (without sand as well from 0.25 s on, with 0.5 of the kinetic energy of its start)"
 
 
 def test_hard_scenes_are_solved():
