@@ -12,6 +12,7 @@ from typing import Final
 import mujoco
 import numpy as np
 
+from rftsim.bench.effort import kinetic_energy
 from rftsim.bench.quiet import quiet
 from rftsim.bench.random_trees import Random, add_tree, between, one_of
 from rftsim.bench.trials import Force, is_lost
@@ -102,6 +103,7 @@ class Scene:
         model = self.bare(h)
         data = mujoco.MjData(model)
         for state in states:
+            mujoco.mj_resetData(model, data)
             mujoco.mj_setState(model, data, state, STATE)
             time = data.time
             if self._falls_apart(model, data, duration):
@@ -109,15 +111,12 @@ class Scene:
         return None
 
     def _falls_apart(self, model: mujoco.MjModel, data: mujoco.MjData, duration: float) -> bool:
-        lost = False
         for _ in range(round(duration / model.opt.timestep)):
             self.move(data)
             mujoco.mj_step(model, data)
-            lost = is_lost(data)
-            if lost:
-                mujoco.mj_resetData(model, data)
-                break
-        return lost
+            if is_lost(data):
+                return True
+        return False
 
 
 def state_of(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
@@ -131,8 +130,7 @@ def _kinetic_energy(model: mujoco.MjModel, state: Array) -> float:
     data = mujoco.MjData(model)
     mujoco.mj_setState(model, data, state, STATE)
     mujoco.mj_forward(model, data)
-    mujoco.mj_energyVel(model, data)
-    return float(data.energy[1])
+    return kinetic_energy(model, data, data.qvel)
 
 
 @functools.lru_cache(maxsize=4)

@@ -76,7 +76,7 @@ class Meter:
         self._worst = max(self._worst, int(spent[1]))
         sand = data.qfrc_passive - data.qfrc_spring - data.qfrc_damper - data.qfrc_gravcomp - data.qfrc_fluid
         done = 0.5 * model.opt.timestep * float(sand @ (before + data.qvel))
-        self._peak = max(self._peak, _energy(model, data, before), _energy(model, data, data.qvel))
+        self._peak = max(self._peak, kinetic_energy(model, data, before), kinetic_energy(model, data, data.qvel))
         self._gain = max(self._gain, done)
 
     def _spent(self, data: mujoco.MjData) -> Any:
@@ -85,7 +85,7 @@ class Meter:
         return np.array([[int(one[name]) for name in _TOTALS] for one in counters]).sum(axis=0)
 
 
-def _energy(model: mujoco.MjModel, data: mujoco.MjData, velocity: Any) -> float:
+def kinetic_energy(model: mujoco.MjModel, data: mujoco.MjData, velocity: Any) -> float:
     """Kinetic energy of a velocity with the inertia at the start of the step [J]."""
     momentum = np.zeros(model.nv)
     mujoco.mj_mulM(model, data, momentum, velocity)
