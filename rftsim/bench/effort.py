@@ -9,6 +9,7 @@ import numpy as np
 from rftsim.bench.trials import is_lost
 from rftsim.engine.block import read_block
 from rftsim.model.readout import instances
+from rftsim.solver.steps import DERIVATIVE
 
 _TOTALS = ("steps", "all_evaluations", "all_derivatives", "all_unsolved")
 
@@ -22,8 +23,8 @@ class Effort(NamedTuple):
     """Evaluations of every body's force, over all steps."""
     derivatives: int
     """Evaluations of its derivative, over all steps."""
-    worst: int
-    """Largest number of evaluations in one step."""
+    worst: float
+    """Evaluations' worth of the costliest step: each derivative counts as two, see `steps.DERIVATIVE`."""
     unsolved: int
     """Equations that were not solved to their tolerance."""
     gain: float
@@ -45,7 +46,7 @@ class Meter:
     def __init__(self) -> None:
         self.lost = False
         self._totals = np.zeros(4, dtype=int)
-        self._worst, self._gain, self._peak = 0, -math.inf, 0.0
+        self._worst, self._gain, self._peak = 0.0, -math.inf, 0.0
         self._model: mujoco.MjModel | None = None
         self._beds: list[int] = []
 
@@ -71,9 +72,8 @@ class Meter:
         self.lost = is_lost(data) or not np.isfinite(data.qpos).all()
         if self.lost:
             return
-        spent = self._spent(data) - spent
-        self._totals += spent
-        self._worst = max(self._worst, int(spent[1]))
+        self._totals += self._spent(data) - spent
+        self._worst = max(self._worst, self._worth(data))
         sand = data.qfrc_passive - data.qfrc_spring - data.qfrc_damper - data.qfrc_gravcomp - data.qfrc_fluid
         done = 0.5 * model.opt.timestep * float(sand @ (before + data.qvel))
         self._peak = max(self._peak, kinetic_energy(model, data, before), kinetic_energy(model, data, data.qvel))
@@ -81,8 +81,14 @@ class Meter:
 
     def _spent(self, data: mujoco.MjData) -> Any:
         """The numbers of `rftsim.work`, summed over the beds."""
-        counters = [read_block(data.plugin_data, data._address, bed).counters for bed in self._beds]
-        return np.array([[int(one[name]) for name in _TOTALS] for one in counters]).sum(axis=0)
+        return np.array([[int(one[name]) for name in _TOTALS] for one in self._counters(data)]).sum(axis=0)
+
+    def _worth(self, data: mujoco.MjData) -> float:
+        """The evaluations' worth of the last step, summed over the beds."""
+        return math.fsum(one["evaluations"] + DERIVATIVE * one["derivatives"] for one in self._counters(data))
+
+    def _counters(self, data: mujoco.MjData) -> list[Any]:
+        return [read_block(data.plugin_data, data._address, bed).counters for bed in self._beds]
 
 
 def kinetic_energy(model: mujoco.MjModel, data: mujoco.MjData, velocity: Any) -> float:

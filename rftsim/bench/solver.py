@@ -59,8 +59,8 @@ class Summary(NamedTuple):
     """Evaluations of the force per step, in the mean over all steps."""
     derivatives: float
     """Evaluations of its derivative per step, in the mean over all steps."""
-    worst: int
-    """Largest number of evaluations in one step."""
+    worst: float
+    """Evaluations' worth of the costliest step: each derivative counts as two."""
     unsolved: float
     """Unsolved equations over steps."""
     gain: float

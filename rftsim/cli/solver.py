@@ -20,7 +20,7 @@ EPISODES = 5.0
 QUICK_SCENES = 20
 """Number of scenes at random of a quick study."""
 BY: Final[dict[str, Callable[[Effort], float]]] = {
-    "most evaluations in a step": lambda effort: effort.worst,
+    "evaluations' worth of a step": lambda effort: effort.worst,
     "evaluations in the mean": lambda effort: effort.evaluations / max(effort.steps, 1),
     "unsolved equations": lambda effort: effort.unsolved,
     "work of the sand in a step [J]": lambda effort: effort.gain,
@@ -61,7 +61,8 @@ def weigh_solver(cases: tuple[str, ...], count: int, quick: bool, memory: Path, 
     console.print(_table(summarise(played)))
     print_line(
         console,
-        "a step: evaluations of the force and of its derivative, in the mean; most: of the force, in one step; open: "
+        "a step: evaluations of the force and of its derivative, in the mean; most: evaluations' worth of one step, "
+        "of 60 at most, in which a derivative counts as two; open: "
         "unsolved equations over steps; J: largest work of the sand in one step; share: that over the largest kinetic "
         "energy of its simulation; lost: simulations lost with sand though not without, and those lost without. The "
         "environments' actions are random or swaying, or come from drives that see nothing",
@@ -88,7 +89,7 @@ def _table(rows: list[Summary]) -> Table:
         table.add_row(
             f"{row.simulations} {row.group}, {1e3 * row.h:g} ms",
             f"{row.evaluations:.1f} + {row.derivatives:.1f}",
-            f"{row.worst}",
+            f"{row.worst:.0f}",
             f"{row.unsolved:.1g}",
             f"{row.gain:.1g}",
             f"{row.share:.1g}",

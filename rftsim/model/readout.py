@@ -253,7 +253,7 @@ class Work(NamedTuple):
     evaluations: int
     """Evaluations of every body's force."""
     derivatives: int
-    """Evaluations of the derivative of every body's force, each worth about four of the force."""
+    """Evaluations of the derivative of every body's force, each worth two to five of the force."""
     unsolved: int
     """Equations whose solution stayed outside the tolerance; the best found was taken."""
 

@@ -8,7 +8,7 @@ from rftsim.solver import equation, linear_algebra, linearised, matrices
 from rftsim.solver.equation import POINT
 from rftsim.solver.motion import add_wrench, differentiate, evaluate, felt_twist, generalised, speed_of, twist_of
 from rftsim.solver.residual import attempt
-from rftsim.solver.steps import keep_best
+from rftsim.solver.steps import BRAKE, is_affordable, keep_best
 
 CENTRED: Final = 3e-3
 """Effect of the force's change within a step on a body's velocity, relative, from which on it is counted."""
@@ -30,7 +30,7 @@ def centre(p, accepted):
     """
     v, start, end, mean = equation.velocity_of(p, POINT.best), equation.start(p), equation.end(p), equation.mean(p)
     if not accepted:
-        if equation.numbers(p).solved == 0.0:
+        if equation.numbers(p).solved == 0.0 and is_affordable(p, BRAKE):
             _brake(p)
         linear_algebra.copy(v, end)
         return

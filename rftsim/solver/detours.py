@@ -18,18 +18,18 @@ from rftsim.solver.motion import (
     speed_of,
     twist_of,
 )
+from rftsim.solver.parts import parts_needed
 from rftsim.solver.residual import attempt
 from rftsim.solver.steps import (
-    BUDGET,
+    BRAKE,
     DERIVATIVE,
-    RESERVE,
+    is_affordable,
     is_misled,
     keep_best,
     move_on,
     note_misfits,
     predict,
     try_along,
-    worth,
 )
 
 NEAR: Final = 0.25
@@ -42,6 +42,8 @@ STAGES: Final = 2
 """Stages, after the first, in which a body that is alone comes to its equation by way of smoother ones."""
 SLIDES: Final = 4.0
 """Speed over v_c from which on a body slides on, whatever v_c is."""
+TIGHTER: Final = 0.3
+"""Share of the missing impulse up to which secants were followed, up to which they are next."""
 LEAST: Final = 0.01
 """Least missing impulse, over all impulses, up to which secants are followed."""
 
@@ -80,7 +82,7 @@ def _arrange_other(p, crossing):
         return
     is_alone = equation.head(p).nbody == 1
     is_close = now.missing < (CLOSE[0] if is_alone else CLOSE[1]) * now.scale
-    is_asked = progress.shortened == 0.0 and progress.rested == 0.0
+    is_asked = progress.shortened == 0.0 and progress.rested == 0.0 and is_affordable(p, 1.0 + BRAKE)
     rest = _rest_along(p, equation.search(p), progress.share) if is_asked else 0.0
     if rest > 0.0:
         progress.rested = 1.0
@@ -92,14 +94,26 @@ def _arrange_other(p, crossing):
         _shorten(p, crossing)  # a face changes its side along the way
         return
     elif is_alone and progress.eased == 0.0:
+        if equation.numbers(p).is_whole > 0.0 and parts_needed(p, equation.numbers(p).h) > 1.0:
+            equation.numbers(p).budget = 0.0  # shorter equations are easier, and the step is to be split anyway
+            return
         progress.eased = 1.0
         _ease(p)
         secants.follow(p, progress.enough)
     else:
-        secants.follow(p, progress.enough)
-        progress.enough = max(0.3 * progress.enough, LEAST)
+        _follow_on(p)
     linear_algebra.clear(equation.is_fresh(p))
     progress.is_stale, progress.shortened = 1.0, 0.0
+
+
+@exact
+def _follow_on(p):
+    """Follow secants to where less is missing than they have led to before."""
+    progress, now = equation.progress(p), equation.scores(p, POINT.now)
+    if now.missing <= progress.enough * now.scale:
+        progress.enough = max(TIGHTER * progress.enough, LEAST)
+    secants.follow(p, progress.enough)
+    progress.enough = max(TIGHTER * progress.enough, LEAST)
 
 
 @exact
@@ -114,7 +128,7 @@ def _ease(p):
     sharp, soft = numbers.v_c, _softest(p)
     fall = (soft / sharp) ** (1.0 / STAGES)
     for stage in range(STAGES + 1):
-        if worth(p) > BUDGET - RESERVE - 2.0 * DERIVATIVE:
+        if not is_affordable(p, 1.0 + DERIVATIVE + 1.0 + BRAKE):
             break
         numbers.v_c = soft if stage == 0 else numbers.v_c / fall
         _linearise_apart(p, 1.0 if stage == 0 else fall)

@@ -27,24 +27,24 @@ NUMBERS: Final = np.dtype(
     [
         (name, "f8")
         for name in (
-            *("timestep", "h", "started", "dragged", "tolerance", "iterations"),
+            *("timestep", "h", "started", "dragged", "is_whole", "tolerance", "iterations", "budget"),
             *("scale", "v_c", "solved", "drift", "parts", "is_linearised", "is_factored", "is_stiff"),
         )
     ]
 )
-"""MuJoCo's time step [s]; that of the equation [s]; whether a step was made before; whether the integrator takes drag
-implicitly; tolerance and most iterations; size of the impulses but the sand's and the rows'; speed below which a
-triangle's stress falls to zero [m/s]; whether the equation was solved; length of the last part of a split step [s];
-parts that are needed; whether `linear` is that of the derivatives as they are, and `linear_factors` are its factors
-with the rows that act as noted; whether `stiff_mass` has the stiffness of these."""
+"""MuJoCo's time step and that of the equation [s]; whether a step was made before, the integrator takes drag
+implicitly, and the step may be split yet; tolerance and most iterations; evaluations' worth that may have been spent by
+the end of this solution; size of the impulses but the sand's and the rows'; speed below which a triangle's stress falls
+to zero [m/s]; whether the equation was solved; length of the last part of a split step [s]; parts that are needed;
+whether `linear` is that of the derivatives as they are, and `linear_factors` are its factors with the rows that act as
+noted; whether `stiff_mass` has the stiffness of these."""
 SCORES: Final = np.dtype([("missing", "f8"), ("scale", "f8"), ("error", "f8")])
 """Scores of a tried velocity: sizes of the missing impulse and of all; speeds' error over what is allowed, unstiff."""
 _OF_PROGRESS: Final = ("is_stale", "shortened", "rested", "eased", "iteration", "loosened")
 PROGRESS: Final = np.dtype([(name, "f8") for name in (*_OF_PROGRESS, "share", "contraction", "enough")])
-"""State of a solution under way: whether the derivatives should be taken anew that misled; how often the direction was
-shortened; whether a body's rest was tried; whether the equation was eased; iterations; factor on the tolerance; share
-of the direction that is tried; that of the missing impulse that a step leaves; that of all impulses up to which secants
-are followed next."""
+"""State of a solution under way: whether derivatives that misled should be taken anew; how often the direction was
+shortened; whether a body's rest was tried, and the equation eased; iterations; factor on the tolerance; share of the
+direction that is tried; of the missing impulse, what a step leaves; of all, up to what secants are followed next."""
 
 
 class Kinds(NamedTuple):

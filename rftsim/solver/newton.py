@@ -31,20 +31,19 @@ from rftsim.solver.equation import POINT
 from rftsim.solver.motion import size_of, speed_of
 from rftsim.solver.residual import allowed, attempt, copy_point
 from rftsim.solver.steps import (
-    BUDGET,
+    BRAKE,
     DERIVATIVE,
     ENOUGH,
     KEPT_LEAVES,
     LEAST_LEFT,
-    RESERVE,
     choose_direction,
+    is_affordable,
     keep_best,
     missed_by,
     move_on,
     note_trends,
     predict,
     try_along,
-    worth,
 )
 
 V_C: Final = 1e-5
@@ -79,7 +78,7 @@ def solve(p):
     _begin(p)
     progress, best = equation.progress(p), equation.scores(p, POINT.best)
     accepted = False
-    while not accepted:
+    while not accepted and (progress.is_stale == 0.0 or is_affordable(p, DERIVATIVE)):
         if progress.shortened == 0.0:
             choose_direction(p)
             accepted = _is_short(p)
@@ -111,7 +110,7 @@ def hold(p, b, twist, out):
 def _is_given_up(p):
     """Whether the solution ends at its best point: too many iterations, or a face on its edge: nothing is nearer."""
     progress, best = equation.progress(p), equation.scores(p, POINT.best)
-    if progress.iteration >= equation.numbers(p).iterations or worth(p) > BUDGET - RESERVE - DERIVATIVE:
+    if progress.iteration >= equation.numbers(p).iterations or not is_affordable(p, 1.0 + BRAKE):
         return True
     return progress.iteration > PATIENCE and (best.error <= progress.loosened or best.missing < ROUGH[1] * best.scale)
 

@@ -20,7 +20,7 @@ from rftsim.solver import constraint_rows, equation, linear_algebra, linearised,
 from rftsim.solver.equation import POINT
 from rftsim.solver.motion import differentiate, felt_twist, generalised, pace_of, square_of, told
 from rftsim.solver.residual import attempt, copy_point
-from rftsim.solver.steps import BUDGET, DERIVATIVE, RESERVE, keep_best, note_misfits, poor_misfit, worth
+from rftsim.solver.steps import BRAKE, DERIVATIVE, is_affordable, keep_best, note_misfits, poor_misfit
 
 WORSE: Final = 1.5
 """Factor on the missing impulse, over all impulses, up to which an extrapolated step is taken."""
@@ -51,7 +51,7 @@ def follow(p, enough):
     linear_algebra.clear(equation.pace(p))
     _note_hard(p)
     while now.missing > enough * now.scale and progress.iteration < numbers.iterations:
-        if worth(p) > BUDGET - RESERVE - DERIVATIVE - 1.0:
+        if not is_affordable(p, DERIVATIVE + 2.0 + BRAKE):
             break
         progress.iteration += 1.0
         _take_secants(p, count % LASTS == 0)

@@ -8,27 +8,22 @@ next step.
 
 from typing import Final
 
-import numpy as np
-
-from rftsim.law.exports import AHEAD
-from rftsim.law.stress import TINY
 from rftsim.machine.compiling import exact
 from rftsim.solver import constraint_rows, equation, linear_algebra, matrices
 from rftsim.solver.equation import KIND, POINT
-from rftsim.solver.motion import felt_twist, generalised, speed_of
+from rftsim.solver.motion import felt_twist
 from rftsim.solver.newton import hold, solve
+from rftsim.solver.parts import parts_needed
 from rftsim.solver.sinking import sink
 from rftsim.solver.step_equation import answer_to, force_to, prepare, reset
-from rftsim.solver.steps import BUDGET, RESERVE, worth
+from rftsim.solver.steps import BRAKE, BUDGET, worth
 
-FINENESS: Final = 7.5
-"""Error of the position in a step, over the depth and the tolerance, above which the step is split."""
-SHALLOWEST: Final = 1e-4
-"""Depth [m] below which none is resolved."""
-FIRST: Final = 3.9
-"""What counts for that error in a first step in which a body moves by more than is allowed: two parts."""
 LEAST_COST: Final = 3.0
 """Evaluations' worth of a part, at least."""
+BEGUN: Final = 2.0
+"""Evaluations' worth of a part that is begun and ends at once."""
+LAST: Final = BEGUN + BRAKE
+"""Evaluations' worth that is kept for the last part."""
 MORE: Final = 2.0
 """Factor to which a step is split finer than was foreseen, where a part of it asks for that."""
 
@@ -36,72 +31,26 @@ MORE: Final = 2.0
 @exact
 def affordable(p, cost):
     """How many parts can be solved with what is left, if one costs so many evaluations' worth."""
-    return (BUDGET - RESERVE - worth(p)) / max(LEAST_COST, cost)
+    return (BUDGET - BRAKE - worth(p)) / max(LEAST_COST, cost)
 
 
 @exact
-def parts_needed(p, time):
-    """Into how many parts a step must be split, by the solution of a time of it in point POINT.best."""
-    h = equation.numbers(p).timestep
-    after, start = equation.velocity_of(p, POINT.best), equation.start(p)
-    grown, late, stopped = equation.grown(p), equation.late(p), equation.stopped(p)
-    pressed = equation.pressed(p)
-    generalised(p, POINT.best, 1, grown)
-    matrices.substitute(p, equation.mass_factors(p), grown, pressed)
-    generalised(p, POINT.best, 0, late)
-    for k in range(after.size):
-        grown[k] = time * (grown[k] - late[k])
-        stopped[k] = after[k] - start[k]
-    matrices.substitute(p, equation.mass_factors(p), grown, late)
-    worst = _position_error(p, time)
-    return np.ceil(np.sqrt(worst) * h / time) if worst > (time / h) ** 2 else 1.0
-
-
-@exact
-def _position_error(p, time):
-    """The bodies' error of position over what is allowed, after `parts_needed` filled what it follows from.
-
-    It is the mean square by the bodies' shares of the sand's force: what a grazing body errs by changes the motion
-    little, for a force goes with the depth, and its share of all forces with it.
-    """
-    start, late = equation.start(p), equation.late(p)
-    stopped, pressed, began = equation.stopped(p), equation.pressed(p), equation.numbers(p).started > 0.0
-    nbody, fineness = equation.head(p).nbody, FINENESS * equation.numbers(p).tolerance
-    square, first, total = 0.0, 0.0, TINY
-    for b in range(nbody):
-        total += _later_force(p, b)
-    for b in range(nbody):
-        travel, share = time * speed_of(p, b, start), _later_force(p, b) / total
-        by_sand = min(speed_of(p, b, stopped), time * speed_of(p, b, pressed))
-        error = min(time * max(speed_of(p, b, late), by_sand) / 8.0, travel) / fineness
-        if error <= SHALLOWEST:
-            continue
-        depth = equation.answer_of(p, POINT.best, b)[AHEAD - 1]
-        if depth <= 0.0:
-            continue
-        square += share * (error / max(depth, SHALLOWEST)) ** 2
-        if not began and travel > fineness * max(depth, SHALLOWEST):
-            first = FIRST
-    return max(np.sqrt(square), first)
-
-
-@exact
-def _later_force(p, b):
-    """Size of the sand's force on a body at the later depths [N]."""
-    f = equation.wrench_of(p, POINT.best, b, 1)
-    return np.sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2])
+def has_next(p):
+    """Whether a part can be begun that is not the last."""
+    return worth(p) + BEGUN + LAST <= BUDGET
 
 
 @exact
 def split_step(p, parts):
     """Take the step in parts, and shorter ones where the equation of one is not solved, as far as evaluations last."""
     h, end = equation.numbers(p).timestep, equation.end(p)
-    drift = _begin(p)
+    equation.numbers(p).is_whole, drift = 0.0, _begin(p)
     part, done, needed = h / parts, 0.0, 1.0
     while done < h * (1.0 - 1e-9):
         part = min(max(part, (h - done) / max(affordable(p, LEAST_COST), 1.0)), h - done)
-        if h - done - part < 0.3 * part:
+        if h - done - part < 0.3 * part or not has_next(p):
             part = h - done
+        equation.numbers(p).budget = BUDGET if part == h - done else BUDGET - LAST
         _solve_part(p, drift, part)
         if equation.numbers(p).solved == 0.0:
             if part > h / (8.0 * parts) and worth(p) < 0.5 * BUDGET:

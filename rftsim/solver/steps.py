@@ -14,8 +14,8 @@ BUDGET: Final = 60.0
 """Evaluations' worth of one step of all bodies."""
 DERIVATIVE: Final = 2.0
 """Evaluations that a derivative is worth."""
-RESERVE: Final = 4.0
-"""Evaluations' worth that is left unspent by one solution, for what follows it."""
+BRAKE: Final = DERIVATIVE + 1.0
+"""Evaluations' worth of the end of a solution that found none."""
 KEPT_LEAVES: Final = 0.3
 FRESH_LEAVES: Final = 0.1
 LEAST_LEFT: Final = 0.02
@@ -34,6 +34,12 @@ def worth(p):
     """The evaluations' worth of what was spent on the step so far."""
     spent = equation.work(p)
     return spent.evaluations + DERIVATIVE * spent.derivatives
+
+
+@exact
+def is_affordable(p, cost):
+    """Whether so many evaluations' worth can be spent on the solution at hand."""
+    return worth(p) + cost <= equation.numbers(p).budget
 
 
 @exact

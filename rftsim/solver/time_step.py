@@ -15,7 +15,8 @@ from rftsim.solver import equation, linear_algebra, matrices
 from rftsim.solver.equation import POINT
 from rftsim.solver.motion import size_of, twist_of
 from rftsim.solver.newton import STRAIN, solve
-from rftsim.solver.split_step import affordable, finish, parts_needed, remember, split_step
+from rftsim.solver.parts import parts_needed
+from rftsim.solver.split_step import affordable, finish, has_next, remember, split_step
 from rftsim.solver.state import KEPT_NUMBERS
 from rftsim.solver.step_equation import answer_to, force_to, prepare, reset
 from rftsim.solver.steps import BUDGET, worth
@@ -163,15 +164,13 @@ def _take_back(p, allowed, work):
 def _parts(p, cost):
     """Into how many parts to split a step that was solved as a whole, if one costs so many evaluations' worth.
 
-    Where the evaluations that are left would not solve them, it stays whole. A body alone is split nonetheless: what
-    is dragged or thrown edge-on comes to another solution in a long step.
+    Where the evaluations that are left would not solve them, it stays whole.
     """
     numbers = equation.numbers(p)
     needed = parts_needed(p, numbers.timestep)
     if numbers.solved == 0.0:
-        needed = 1.0 if _is_late(p) else max(needed, UNSOLVED_PARTS)
-    is_begun = equation.head(p).nbody == 1 or affordable(p, cost) >= 2.0
-    return needed if is_begun else 1.0
+        needed = max(needed, UNSOLVED_PARTS)
+    return needed if has_next(p) and affordable(p, cost) >= 2.0 else 1.0
 
 
 @exact
@@ -185,6 +184,7 @@ def _one_step(p, most_parts):
         start[k] += lacking[k]
     if numbers.parts <= 1.0 or most_parts == 1:
         prepare(p, 0.5 * (drift + h))
+        numbers.budget, numbers.is_whole = BUDGET, 1.0 if most_parts > 1 else 0.0
         solve(p)
         numbers.parts = _parts(p, PART_COSTS * (worth(p) - before))
     if numbers.parts > 1.0 and most_parts > 1:

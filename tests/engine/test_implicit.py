@@ -253,6 +253,14 @@ def test_hard_case(case, h):
     assert played.evaluations < 6.0
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("case", ["edge-on plate", "edge-on drag"])
+def test_edge_on_at_long_steps(case):
+    """At 10 ms within 1 %; solved as a whole before it is split, the plate's first step comes to another solution."""
+    played = stability.play(case, 1e-2, "implicit")
+    assert stability.judge(played, stability.references(case)).error < 0.01
+
+
 @pytest.fixture(scope="module")
 def starts():
     return stability.random_starts(1000)
