@@ -10,7 +10,7 @@ import numpy as np
 
 from rftsim.law.stress import TINY
 from rftsim.machine.compiling import exact
-from rftsim.solver import equation, matrices
+from rftsim.solver import equation, linear_algebra, matrices
 from rftsim.solver.equation import KIND
 
 FREE: Final = 0
@@ -29,22 +29,23 @@ def product(p, i, v):
 
 
 @exact
-def _seen(p, change):
-    """M^-1 M_h of a velocity change: the change that MuJoCo's solver of the constraints sees."""
-    if equation.numbers(p).dragged == 0.0:
-        return change
-    h, dragged, seen = equation.numbers(p).h, equation.slowed(p), equation.seen(p)
+def see(p, change, out):
+    """Fill out with M^-1 M_h of a velocity change: the change that MuJoCo's solver of the constraints sees."""
+    if equation.head(p).nrow == 0 or equation.numbers(p).dragged == 0.0:
+        linear_algebra.copy(change, out)
+        return
+    h, dragged = equation.numbers(p).h, equation.slowed(p)
     matrices.multiply(p, equation.drag(p), change, dragged)
-    matrices.substitute(p, equation.plain_factors(p), dragged, seen)
-    for k in range(seen.size):
-        seen[k] = change[k] + h * seen[k]
-    return seen
+    matrices.substitute(p, equation.plain_factors(p), dragged, out)
+    for k in range(out.size):
+        out[k] = change[k] + h * out[k]
 
 
 @exact
 def accelerations(p, change, out):
     """Fill out with J a - aref at a velocity change v+ - v, (nrow,)."""
-    seen, inverse, reference = _seen(p, change), 1.0 / equation.numbers(p).h, equation.row_reference(p)
+    seen, inverse, reference = equation.seen(p), 1.0 / equation.numbers(p).h, equation.row_reference(p)
+    see(p, change, seen)
     for i in range(out.size):
         out[i] = inverse * product(p, i, seen) - reference[i]
 
@@ -161,6 +162,15 @@ def note_zones(p, x):
         zone[i] = now
         i = last
     return changed
+
+
+@exact
+def do_hold(p):
+    """Whether a row acts, as noted, that is no friction: what it holds it holds more stiffly than sand does."""
+    kind, zone, found = equation.row_kind(p), equation.row_zone(p), False
+    for i in range(kind.size):
+        found = found or (kind[i] != KIND.friction and kind[i] != KIND.tangent and zone[i] != FREE)
+    return found
 
 
 @exact

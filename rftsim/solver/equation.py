@@ -28,7 +28,7 @@ NUMBERS: Final = np.dtype(
         (name, "f8")
         for name in (
             *("timestep", "h", "started", "dragged", "is_whole", "tolerance", "iterations", "budget"),
-            *("scale", "v_c", "solved", "drift", "parts", "is_linearised", "is_factored", "is_stiff"),
+            *("scale", "v_c", "solved", "drift", "parts", "is_linearised", "is_factored", "is_direct", "is_stiff"),
         )
     ]
 )
@@ -36,8 +36,8 @@ NUMBERS: Final = np.dtype(
 implicitly, and the step may be split yet; tolerance and most iterations; evaluations' worth that may have been spent by
 the end of this solution; size of the impulses but the sand's and the rows'; speed below which a triangle's stress falls
 to zero [m/s]; whether the equation was solved; length of the last part of a split step [s]; parts that are needed;
-whether `linear` is that of the derivatives as they are, and `linear_factors` are its factors with the rows that act as
-noted; whether `stiff_mass` has the stiffness of these."""
+whether `linear` is that of the derivatives as they are, whether `linear_factors` are its factors with the rows that act
+as noted, and for v+ - v itself instead of what rows see of it; whether `stiff_mass` has the stiffness of these."""
 SCORES: Final = np.dtype([("missing", "f8"), ("scale", "f8"), ("error", "f8")])
 """Scores of a tried velocity: sizes of the missing impulse and of all; speeds' error over what is allowed, unstiff."""
 _OF_PROGRESS: Final = ("is_stale", "shortened", "rested", "eased", "iteration", "loosened")
@@ -220,7 +220,7 @@ direction = _T.vector("ndof")
 taken = _T.vector("ndof")
 """Scratch: the velocity change by that, (ndof,)."""
 late_share = _T.vector("ndof")
-"""Scratch: about the diagonal of M_h^-1 M, (ndof,)."""
+"""Scratch: about the diagonal of M^-1 M_h, or of its inverse, (ndof,)."""
 missing = _T.vector("ndof")
 """Scratch: the impulse missing in the linearised equation, (ndof,)."""
 fixed = _T.vector("ndof")
@@ -273,8 +273,6 @@ pressed = _T.vector("ndof")
 """Scratch: the acceleration by the sand's force at the later depths, (ndof,)."""
 unforced = _T.vector("ndof")
 """Scratch: the impulse missing without the sand, (ndof,)."""
-nothing = _T.vector("ndof")
-"""Scratch: zeros, (ndof,)."""
 mean_velocity = _T.vector("ndof")
 """Scratch: the mean velocity over the parts of a split step, (ndof,)."""
 moved = _T.vector("ndof")

@@ -86,42 +86,50 @@ def _linearise(p, which):
 def _factor(p, x, force, is_changed):
     """Factor the matrix of the linearised equation, with the rows' stiffness at x, and whether that is another.
 
-    Where there are rows and drag, it is that for the velocity change that the rows see, M^-1 M_h (v+ - v); the sand's
-    share is then approximate, by a diagonal of what leads back from that.
+    Where there are rows and drag, rows see another velocity change, M^-1 M_h (v+ - v). Of that the matrix is where rows
+    act that are stiffer than the sand; the sand's share is then approximate, by a diagonal of what leads back. Else it
+    is that of v+ - v itself, and the share of the friction rows is approximate.
     """
     a, linear, stiff = equation.linear_factors(p), equation.linear(p), equation.stiff_mass(p)
+    share, numbers = equation.late_share(p), equation.numbers(p)
+    numbers.is_factored = numbers.is_direct = 1.0
     if equation.head(p).nrow == 0:
         matrices.copy(p, linear, a)
-    else:
-        if is_changed or equation.numbers(p).is_stiff == 0.0:
-            matrices.copy(p, equation.plain_mass(p), stiff)
-            constraint_rows.add_stiffness(p, x, force, stiff)
-            equation.numbers(p).is_stiff = 1.0
-        matrices.copy(p, stiff, a)
-        share, h = equation.late_share(p), equation.numbers(p).h
+        matrices.factor(p, a)
+        return
+    if is_changed or numbers.is_stiff == 0.0:
+        matrices.copy(p, equation.plain_mass(p), stiff)
+        constraint_rows.add_stiffness(p, x, force, stiff)
+        numbers.is_stiff = 1.0
+    for k in range(share.size):
+        drag = max(equation.drag(p)[(share.size + 1) * k], 0.0)
+        share[k] = 1.0 + numbers.h * drag * equation.lightness(p)[k]
+    if constraint_rows.do_hold(p):
+        numbers.is_direct = 0.0
         for k in range(share.size):
-            share[k] = 1.0 / (1.0 + h * max(equation.drag(p)[(share.size + 1) * k], 0.0) * equation.lightness(p)[k])
+            share[k] = 1.0 / share[k]
+        matrices.copy(p, stiff, a)
         matrices.add_difference(p, linear, equation.mass(p), share, a)
+    else:
+        matrices.copy(p, linear, a)
+        matrices.add_difference(p, stiff, equation.plain_mass(p), share, a)
     matrices.factor(p, a)
-    equation.numbers(p).is_factored = 1.0
 
 
 @exact
 def substitute(p, impulse, seen, out):
     """Fill out with the velocity change by an impulse, by the last factors, and seen with the one that rows see."""
-    slowed = equation.slowed(p)
+    if equation.numbers(p).is_direct > 0.0:
+        matrices.substitute(p, equation.linear_factors(p), impulse, out)
+        constraint_rows.see(p, out, seen)
+        return
     matrices.substitute(p, equation.linear_factors(p), impulse, seen)
-    if not is_indirect(p):
+    if equation.numbers(p).dragged == 0.0:
         linear_algebra.copy(seen, out)
         return
+    slowed = equation.slowed(p)
     matrices.multiply(p, equation.plain_mass(p), seen, slowed)
     matrices.substitute(p, equation.mass_factors(p), slowed, out)
-
-
-@exact
-def is_indirect(p):
-    """Whether the rows see another velocity change than the equation's."""
-    return equation.head(p).nrow > 0 and equation.numbers(p).dragged > 0.0
 
 
 @exact
@@ -175,7 +183,7 @@ def _solve_with_rows(p, v, errors, residual, which, out):
         for i in range(moved.size):
             moved[i] = constraint_rows.product(p, i, direction)
         t = _crossing(p, slope, stiff)
-        for k in range(v.size):
+        for k in range(out.size):
             out[k] += t * taken[k]
             fixed[k] += t * change[k]
             missing[k] = fixed[k]

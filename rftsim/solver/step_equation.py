@@ -30,11 +30,10 @@ def force_to(p, velocity, out):
     """Fill out with the sand's force that makes MuJoCo's step end at a velocity; the equation is that of the step."""
     h = equation.numbers(p).timestep
     linear_algebra.copy(equation.velocity(p), equation.start(p))
-    unforced, nothing = equation.unforced(p), equation.nothing(p)
-    linear_algebra.clear(nothing)
-    errors = equation.row_error(p)
+    unforced, errors = equation.unforced(p), equation.row_error(p)
+    linear_algebra.clear(out)
     constraint_rows.errors_at(p, velocity, errors)
-    residual.fill(p, velocity, errors, nothing, unforced)
+    residual.fill(p, velocity, errors, out, unforced)
     for k in range(out.size):
         out[k] = unforced[k] / h
 
