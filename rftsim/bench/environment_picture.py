@@ -37,7 +37,8 @@ def plot_environment(rows: list[Timed], path: Path) -> None:
     ticks = [1, 2, 3, 5, 10, 20, 30, 100, 300, 1000]
     left.set_yticks(ticks, [f"{tick}" for tick in ticks])
     left.set_ylabel("step, over that without sand")
-    left.set_ylim(0.7, 1.5 * max(limit for limit in (*LIMITS.values(), *(row.ratio for row in rows)) if limit < np.inf))
+    ratios = [row.ratio for row in rows]
+    left.set_ylim(0.7 * min(1.0, *ratios), 1.5 * max(limit for limit in (*LIMITS.values(), *ratios) if limit < np.inf))
     right.set_ylabel(f"throughput of {SIMULATIONS}, likewise")
     for axis, names in ((left, cases), (right, batched)):
         axis.set_xticks(np.arange(len(names)), [f"{name}\n{law}" for name, law in names], rotation=90)
