@@ -42,7 +42,7 @@ def centre(p, accepted):
     if _largest(p, mean, end) <= 2.0:
         return
     effect = _foresee(p)
-    if effect > CURVED:
+    if effect > CURVED and is_affordable(p, 1.0):
         _evaluate(p)
     if effect > 1.0:
         _correct(p)

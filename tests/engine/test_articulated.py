@@ -218,7 +218,7 @@ def test_no_step_costs_more_than_its_budget(h):
     played = [solver.Played(group.name, seed, h, group.measure(seed, h)) for seed in ("13", "80", "147", "252")]
     (summary,) = solver.summarise(played)
     assert summary.unsolved > 0.0
-    assert 50.0 < summary.worst <= BUDGET
+    assert 50.0 < summary.worst <= BUDGET + 1e-9  # shares of an evaluation add up, rounded
 
 
 @pytest.mark.slow
