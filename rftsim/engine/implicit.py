@@ -167,19 +167,19 @@ def _fill_drag(model, data, m, d, i, island, p):
                 numbers.dragged = 1.0 if damping[dofs[k]] != 0.0 else numbers.dragged
         return
     number, start = int32s(pointer(m + model.D_rownnz), nv), int32s(pointer(m + model.D_rowadr), nv)
-    total, most = start[nv - 1] + number[nv - 1], 0.0
+    total, is_dragged = start[nv - 1] + number[nv - 1], False
     column, value = int32s(pointer(m + model.D_colind), total), doubles(pointer(d + data.qDeriv), total)
     for k in range(first, first + islands.dof_count(i)[island]):
         dof, at = dofs[k], place[dofs[k]]
         for entry in range(start[dof], start[dof] + number[dof]):
             j, drag = peek(column, entry), -peek(value, entry)
-            most = max(most, abs(drag))
+            is_dragged = is_dragged or drag != 0.0
             if integrator == _IMPLICIT or j == dof:
                 poke(out, n * at + peek(place, j), drag)
             elif j < dof:  # implicitfast takes the lower triangle for both
                 poke(out, n * at + peek(place, j), drag)
                 poke(out, n * peek(place, j) + at, drag)
-    numbers.dragged = 1.0 if most > 0.0 else 0.0
+    numbers.dragged = 1.0 if is_dragged else 0.0
 
 
 @inline

@@ -16,7 +16,7 @@ from rftsim.solver.equation import POINT
 from rftsim.solver.motion import size_of, twist_of
 from rftsim.solver.newton import STRAIN, solve
 from rftsim.solver.parts import parts_needed
-from rftsim.solver.split_step import affordable, finish, has_next, remember, split_step
+from rftsim.solver.split_step import affordable, finish, remember, split_step
 from rftsim.solver.state import KEPT_NUMBERS
 from rftsim.solver.step_equation import answer_to, force_to, prepare, reset
 from rftsim.solver.steps import BUDGET, worth
@@ -170,7 +170,7 @@ def _parts(p, cost):
     needed = parts_needed(p, numbers.timestep)
     if numbers.solved == 0.0:
         needed = max(needed, UNSOLVED_PARTS)
-    return needed if has_next(p) and affordable(p, cost) >= 2.0 else 1.0
+    return needed if affordable(p, cost) >= 2.0 else 1.0
 
 
 @exact
